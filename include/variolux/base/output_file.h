@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+
+namespace vlx {
+
+/// A file under construction: written under a temporary name beside its final one, renamed by commit().
+/// Destroyed uncommitted (an exception, an early return), it is deleted: nothing partial ever has the final
+/// name.
+class OutputFile {
+  public:
+    /// Throws Error when the folder does not exist or cannot be written to. The temporary name ends with the
+    /// final name's extension, so libraries that choose the format by extension write the right one.
+    explicit OutputFile(std::string path);
+    ~OutputFile();
+    OutputFile(const OutputFile&) = delete;
+    OutputFile& operator=(const OutputFile&) = delete;
+
+    const std::string& path() const { return path_; }
+    const std::string& temporaryPath() const { return temporary_; }
+
+    /// Flushes the temporary file to disk and renames it to its final name. Throws Error when that fails.
+    void commit();
+
+  private:
+    std::string path_;
+    std::string temporary_;
+    bool committed_ = false;
+};
+
+}  // namespace vlx

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "variolux/dump/band.h"
+#include "variolux/dump/format.h"
+
+namespace vlx {
+
+/// Reads a dump in bands of rows, in any order, from the first deep scanline part of an OpenEXR file, whoever
+/// wrote it. Nothing in a header is trusted: windows, chunk tables and sample counts are checked against the
+/// file's size before anything is allocated. Memory is one band, whatever the image's height. Not for use
+/// from two threads at once: give each its own reader.
+class DumpReader {
+  public:
+    /// Opens the file and reads its header. Throws Error (naming the file, and what is wrong) when it is
+    /// missing, not OpenEXR, flat, deep tiled, truncated, has no R, G or B, or has a header that its size
+    /// contradicts.
+    explicit DumpReader(const std::string& path);
+    ~DumpReader();
+    DumpReader(DumpReader&&) noexcept;
+    DumpReader& operator=(DumpReader&&) noexcept;
+
+    const std::string& path() const;
+    const DumpHeader& header() const;
+    std::uint64_t fileBytes() const;
+
+    /// Samples of rows [y, y + rows), of the named channels only, in the given order (all of the header's
+    /// when empty). Decompression of the rows is spread over threads; the result does not depend on their
+    /// number. Throws Error naming the file, the scanline and the reason when a chunk is missing, truncated,
+    /// or inconsistent (counts that decrease, sizes that disagree); throws Error on rows outside the window
+    /// or unknown channels.
+    SampleBand read(int y, int rows, const std::vector<std::string>& channels = {}) const;
+
+    /// Sample counts of rows [y, y + rows), row by row. Same errors.
+    std::vector<std::uint32_t> counts(int y, int rows) const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vlx

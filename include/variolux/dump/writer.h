@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "variolux/dump/band.h"
+#include "variolux/dump/format.h"
+
+namespace vlx {
+
+/// Writes a dump as a two-part OpenEXR file, streaming: a flat `beauty` part (per-pixel means of R, G, B, A
+/// and, when present, the mean Z of hits; FLOAT) that every viewer shows, and the deep scanline part
+/// `samples`. Compression and disk writes run on a thread of the writer's own (and OpenEXR's pool), never on
+/// the caller's; memory is a few bands, whatever the image's height. The file appears under its name only
+/// after close().
+///
+/// Use: construct, write() bands of consecutive rows from the top to the bottom without gaps, close().
+/// Destroyed before close(), it leaves no file.
+class DumpWriter {
+  public:
+    /// Throws Error on an unusable header: empty or over-large windows (more than 2^31-1 pixels in a row or
+    /// rows), no channels, duplicate or invalid names, or when the file cannot be created.
+    DumpWriter(const std::string& path, const DumpHeader& header);
+    ~DumpWriter();
+    DumpWriter(const DumpWriter&) = delete;
+    DumpWriter& operator=(const DumpWriter&) = delete;
+
+    /// Queues the next rows; waits when too many bands are queued (bounded memory). The band must span the
+    /// data window's columns, start at the row after the last one written, and hold the header's channels in
+    /// its order. Throws Error on a band that does not, and on an earlier background write that failed (full
+    /// disk).
+    void write(SampleBand band);
+
+    /// Waits for all bands, records `renderSeconds` in the header when positive, and gives the file its name.
+    /// Throws Error when rows are missing or any write failed; then no file is left.
+    void close(double renderSeconds = 0);
+
+    /// Processor seconds that compression and writing have taken so far, on all threads of the writer.
+    double cpuSeconds() const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vlx

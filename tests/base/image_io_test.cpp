@@ -1,0 +1,63 @@
+#include "variolux/base/image_io.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "temporary_folder.h"
+#include "variolux/base/error.h"
+
+namespace vlx {
+namespace {
+
+TEST(ImageIo, ExrKeepsValuesWindowsAndChannelNames) {
+    const TemporaryFolder folder;
+    Image image(Window{-3, 5, 7, 4}, {"R", "G", "B", "stddev.R"});
+    image.display = Window{0, 0, 20, 10};
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+        image.pixels[i] = 1e-3f * static_cast<float>(i) - 0.01f;
+    writeImage(folder / "a.exr", image);
+    const Image back = readImage(folder / "a.exr");
+    EXPECT_EQ(back.data, image.data);
+    EXPECT_EQ(back.display, image.display);
+    EXPECT_EQ(back.channels, image.channels);
+    EXPECT_EQ(back.pixels, image.pixels);
+    EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(ImageIo, PngStoresValuesAsTheyAre) {
+    const TemporaryFolder folder;
+    Image image(Window{0, 0, 2, 1}, {"R", "G", "B"});
+    image.pixels = {0.0f, 0.5f, 1.0f, 2.0f, -1.0f, 0.25f};
+    writeImage(folder / "a.png", image);
+    const Image back = readImage(folder / "a.png");
+    const std::vector<float> expected = {0.0f, 0.5f, 1.0f, 1.0f, 0.0f, 0.25f};
+    for (std::size_t i = 0; i < expected.size(); ++i)
+        EXPECT_NEAR(back.pixels[i], expected[i], 0.5f / 255 + 1e-6f);
+}
+
+TEST(ImageIo, BadFilesAreErrorsThatNameTheFile) {
+    const TemporaryFolder folder;
+    std::ofstream(folder / "text.exr") << "this is no image";
+    for (const std::string name : {"missing.exr", "text.exr"}) {
+        try {
+            readImage(folder / name);
+            FAIL() << name;
+        } catch (const Error& error) {
+            EXPECT_NE(std::string(error.what()).find(name), std::string::npos);
+        }
+    }
+    EXPECT_THROW(writeImage(folder / "a.nosuchformat", Image(Window{0, 0, 1, 1}, {"R"})), Error);
+    EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(LinearToSrgb, MeetsTheStandardsValues) {
+    EXPECT_EQ(linearToSrgb(-1.0f), 0.0f);
+    EXPECT_EQ(linearToSrgb(2.0f), 1.0f);
+    EXPECT_NEAR(linearToSrgb(0.0031308f), 0.04045f, 1e-5f);
+    EXPECT_NEAR(linearToSrgb(0.214041f), 0.5f, 1e-5f);  // IEC 61966-2-1
+}
+
+}  // namespace
+}  // namespace vlx

@@ -1,0 +1,51 @@
+#include "variolux/base/output_file.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "temporary_folder.h"
+#include "variolux/base/error.h"
+
+namespace vlx {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(OutputFile, AppearsOnlyWhenCommitted) {
+    const TemporaryFolder folder;
+    {
+        OutputFile file(folder / "a.exr");
+        std::ofstream(file.temporaryPath()) << "whole";
+        EXPECT_FALSE(fs::exists(folder / "a.exr"));
+        EXPECT_EQ(fs::path(file.temporaryPath()).extension(), ".exr");
+        file.commit();
+    }
+    EXPECT_EQ(fs::file_size(folder / "a.exr"), 5u);
+    EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(OutputFile, UncommittedLeavesNothingAndKeepsTheOldFile) {
+    const TemporaryFolder folder;
+    std::ofstream(folder / "a.exr") << "old";
+    {
+        OutputFile file(folder / "a.exr");
+        std::ofstream(file.temporaryPath()) << "half";
+    }
+    EXPECT_EQ(fs::file_size(folder / "a.exr"), 3u);
+    EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(OutputFile, MissingFolderIsAnErrorThatNamesTheFile) {
+    const TemporaryFolder folder;
+    try {
+        OutputFile file(folder / "no/a.exr");
+        FAIL();
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("no/a.exr"), std::string::npos);
+    }
+}
+
+}  // namespace
+}  // namespace vlx
