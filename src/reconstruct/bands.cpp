@@ -1,0 +1,62 @@
+#include "bands.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace vlx {
+
+namespace {
+
+/// Floor of a / b for b > 0, also for negative a: windows may start anywhere.
+int floorDivide(int a, int b) { return a / b - (a % b < 0 ? 1 : 0); }
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+ChannelChoice chooseChannels(const DumpHeader& header) {
+    ChannelChoice choice;
+    const auto add = [&](const char* channel) {
+        choice.names.emplace_back(channel);
+        return static_cast<int>(choice.names.size()) - 1;
+    };
+    for (const char* channel : {"R", "G", "B", "A"})
+        if (findChannel(header, channel) >= 0) choice.layout.radiance.push_back(add(channel));
+    if (findChannel(header, "sample.x") >= 0 && findChannel(header, "sample.y") >= 0) {
+        choice.layout.x = add("sample.x");
+        choice.layout.y = add("sample.y");
+    }
+    return choice;
+}
+
+Image makeOutputImage(const DumpHeader& header, const ChannelChoice& channels) {
+    std::vector<std::string> names(channels.names.begin(), channels.names.begin() + channels.radianceCount());
+    for (const char* channel : {"stddev.R", "stddev.G", "stddev.B"}) names.emplace_back(channel);
+    Image image(header.data, std::move(names));
+    image.display = header.display;
+    return image;
+}
+
+void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step, ReconstructionReport& report,
+                 const Progress& progress, const std::function<void(const SampleBand&)>& body) {
+    const Window& window = reader.header().data;
+    const int end = window.y + window.height;
+    // Enough regions in flight to keep threads busy; little enough that a 32-spp 4K band stays near 100 MB.
+    const int rows = step * std::max(1, 8 / step);
+    for (int y = window.y; y < end;) {
+        const int next = std::min(end, (floorDivide(y, step) * step) + rows);
+        const auto start = std::chrono::steady_clock::now();
+        const SampleBand band = reader.read(y, next - y, channels.names);
+        const double readTime = secondsSince(start);
+        report.readSeconds += readTime;
+        report.samples += static_cast<std::int64_t>(band.samples());
+        body(band);
+        report.solveSeconds += secondsSince(start) - readTime;
+        y = next;
+        if (progress) progress(y - window.y, window.height);
+    }
+}
+
+}  // namespace vlx

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "variolux/base/progress.h"
+#include "variolux/dump/reader.h"
+#include "variolux/reconstruct/reconstruction.h"
+#include "variolux/reconstruct/region.h"
+
+namespace vlx {
+
+/// The channels of a dump that a reconstruction reads, in this order, and their roles in the bands so read.
+struct ChannelChoice {
+    std::vector<std::string> names;
+    BandLayout layout;
+    int radianceCount() const { return static_cast<int>(layout.radiance.size()); }
+};
+
+/// R, G, B, then A and the sample positions where the dump has them.
+ChannelChoice chooseChannels(const DumpHeader& header);
+
+/// An image of the dump's windows with R, G, B (A) and stddev.R, stddev.G, stddev.B.
+Image makeOutputImage(const DumpHeader& header, const ChannelChoice& channels);
+
+/// Reads the dump in bands of rows that start at multiples of `step` in raster coordinates (the first and the last may be
+/// shorter), each about a few megabytes of samples, and calls body(band). Adds what reading took to
+/// report.readSeconds and the samples to report.samples.
+void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step, ReconstructionReport& report,
+                 const Progress& progress, const std::function<void(const SampleBand&)>& body);
+
+}  // namespace vlx

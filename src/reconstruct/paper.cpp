@@ -1,0 +1,186 @@
+#include "variolux/reconstruct/paper.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "bands.h"
+#include "variolux/base/error.h"
+#include "variolux/base/parallel.h"
+#include "variolux/geostat/empirical_variogram.h"
+#include "variolux/geostat/kriging.h"
+#include "variolux/geostat/variogram_fit.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr int kColours = 3;        // R, G, B carry the variogram
+constexpr int kMinData = 3;        // a variogram needs two distances
+constexpr int kDistanceClasses = 12;
+
+/// The index of the pixel of the region that holds a position.
+int pixelOf(const Window& pixels, double x, double y) {
+    const int col = std::clamp(static_cast<int>(std::floor(x)) - pixels.x, 0, pixels.width - 1);
+    const int row = std::clamp(static_cast<int>(std::floor(y)) - pixels.y, 0, pixels.height - 1);
+    return row * pixels.width + col;
+}
+
+/// What a region's data say before any kriging.
+struct Moments {
+    Eigen::RowVectorXd mean;      // c: arithmetic mean of all samples
+    Eigen::VectorXd errors;       // n: error variance of each datum, summed over R, G, B
+    Eigen::Array3d spread;        // variance between the data, a colour
+    double signal = 0;            // spread less errors, summed over colours, >= 0
+
+    Moments(const RegionData& data)
+        : mean(data.counts.transpose() * data.means / data.counts.sum()),
+          errors(data.sampleVariance.head(kColours).sum() / data.counts.array()),
+          spread((data.means.leftCols(kColours).rowwise() - mean.head(kColours))
+                     .colwise()
+                     .squaredNorm()
+                     .transpose()
+                     .array() /
+                 static_cast<double>(data.size())),
+          signal(std::max(0.0, spread.sum() - errors.mean())) {}
+};
+
+/// RGB of each pixel's first estimate, as a difference from the region's mean (see krigeRegion, 3).
+Eigen::MatrixXd firstEstimates(const RegionData& data, const Moments& moments) {
+    const Eigen::Index pixels = data.pixels.pixels();
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(pixels, kColours);
+    Eigen::VectorXd count = Eigen::VectorXd::Zero(pixels);
+    for (Eigen::Index i = 0; i < data.size(); ++i) {
+        const int pixel = pixelOf(data.pixels, data.positions(i, 0), data.positions(i, 1));
+        sum.row(pixel) += data.counts[i] * (data.means.row(i) - moments.mean).head(kColours);
+        count[pixel] += data.counts[i];
+    }
+    const double sampleError = data.sampleVariance.head(kColours).sum();
+    for (Eigen::Index p = 0; p < pixels; ++p) {
+        if (count[p] == 0) continue;  // no estimate of its own: the region's mean, difference zero
+        const double error = sampleError / count[p];
+        const double share = moments.signal > 0 ? moments.signal / (moments.signal + error) : 0;
+        sum.row(p) *= share / count[p];
+    }
+    return sum;
+}
+
+/// Composite coordinates: position, then the scaled colour difference; only the position when k is 0.
+Eigen::MatrixXd composite(const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours, double k) {
+    if (k == 0) return positions;
+    Eigen::MatrixXd joined(positions.rows(), 2 + kColours);
+    joined << positions, k * colours;
+    return joined;
+}
+
+/// Each pixel as a block of its cells' centres; every cell of a pixel has the pixel's colour.
+KrigingTargets pixelTargets(const RegionData& data, const Eigen::MatrixXd& colours, double k) {
+    const int cells = data.cellsPerPixel, perPixel = cells * cells;
+    const Eigen::Index pixels = data.pixels.pixels();
+    Eigen::MatrixXd places(pixels * perPixel, 2), repeated(pixels * perPixel, kColours);
+    KrigingTargets targets;
+    Eigen::Index i = 0;
+    for (Eigen::Index p = 0; p < pixels; ++p) {
+        targets.begin.push_back(i);
+        for (int cell = 0; cell < perPixel; ++cell, ++i) {
+            places.row(i) << data.pixels.x + static_cast<double>(p % data.pixels.width) +
+                                 (cell % cells + 0.5) / cells,
+                data.pixels.y + static_cast<double>(p / data.pixels.width) + (cell / cells + 0.5) / cells;
+            repeated.row(i) = colours.row(p);
+        }
+    }
+    targets.begin.push_back(i);
+    targets.points = composite(places, repeated, k);
+    return targets;
+}
+
+/// The region's arithmetic mean everywhere; its error from the samples' noise and what the data vary about it.
+void useMean(RegionEstimate& estimate, const RegionData& data, const Moments& moments, RegionOutcome outcome) {
+    estimate.diagnostics.outcome = outcome;
+    estimate.values.rowwise() = moments.mean;
+    for (int c = 0; c < kColours; ++c) {
+        const double noise = data.sampleVariance[c] / data.counts.sum();
+        const double signal = std::max(0.0, moments.spread[c] - data.sampleVariance[c] * data.counts.cwiseInverse().mean());
+        estimate.stddev.col(c).setConstant(std::sqrt(noise + (outcome == RegionOutcome::NoStructure ? 0 : signal)));
+    }
+}
+
+/// Splits each target's kriging variance, which is for the sum of the colours, between them: the noise part by
+/// the weights exactly, the rest like the data's own variation.
+void colourErrors(RegionEstimate& estimate, const RegionData& data, const Moments& moments,
+                  const KrigingPrediction& prediction) {
+    const Eigen::VectorXd noise = prediction.weights.array().square().matrix() * data.counts.cwiseInverse();
+    const double spread = moments.spread.sum();
+    for (int c = 0; c < kColours; ++c) {
+        const double share = spread > 0 ? moments.spread[c] / spread : 1.0 / kColours;
+        for (Eigen::Index p = 0; p < estimate.values.rows(); ++p) {
+            const double allNoise = noise[p] * data.sampleVariance.head(kColours).sum();
+            const double signal = std::max(0.0, prediction.variance[p] - allNoise) * share;
+            estimate.stddev(p, c) = std::sqrt(signal + noise[p] * data.sampleVariance[c]);
+        }
+    }
+}
+
+}  // namespace
+
+std::optional<std::string> PaperOptions::validate() const {
+    if (regionSize < 0 || regionSize > 64)
+        return "expected a region size of 1 to 64 pixels, or 0 for the whole image, found " +
+               std::to_string(regionSize);
+    return std::nullopt;
+}
+
+RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) {
+    const Eigen::Index pixels = data.pixels.pixels();
+    RegionEstimate estimate;
+    estimate.values = Eigen::MatrixXd::Zero(pixels, data.means.cols());
+    estimate.stddev = Eigen::MatrixXd::Zero(pixels, data.means.cols());
+    RegionDiagnostics& diagnostics = estimate.diagnostics;
+    diagnostics.pixels = data.pixels;
+    diagnostics.data = data.size();
+    diagnostics.samples = data.samples;
+    if (data.size() == 0) return estimate;  // RegionOutcome::Empty
+
+    const Moments moments(data);
+    diagnostics.errorVariance = data.sampleVariance.head(kColours).sum();
+    const bool equal = (data.means.rowwise() - data.means.row(0)).cwiseAbs().maxCoeff() == 0;
+    if (equal && diagnostics.errorVariance == 0) {
+        useMean(estimate, data, moments, RegionOutcome::AllEqual);
+        return estimate;
+    }
+    if (data.size() < kMinData) {
+        useMean(estimate, data, moments, RegionOutcome::TooFewData);
+        return estimate;
+    }
+
+    const double deviation = std::sqrt(moments.spread.sum());
+    const double k = options.colourDistance && deviation > 0 ? 1 / deviation : 0;
+    diagnostics.colourScale = k;
+    const Eigen::MatrixXd differences = data.means.leftCols(kColours).rowwise() - moments.mean.head(kColours);
+
+    KrigingProblem problem;
+    problem.positions = composite(data.positions, differences, k);
+    // FIT
+    problem.values = data.means;
+    problem.errorVariances = moments.errors;
+
+    const KrigingSystem system(problem);
+    diagnostics.condition = system.report().conditionEstimate;
+    diagnostics.jitter = system.report().jitter;
+    if (!system.report().ok()) {
+        useMean(estimate, data, moments, RegionOutcome::SolveFailed);
+        return estimate;
+    }
+    const KrigingPrediction prediction =
+        system.predict(pixelTargets(data, firstEstimates(data, moments), k), {.weights = true});
+    if (!prediction.estimate.allFinite() || !prediction.variance.allFinite()) {
+        useMean(estimate, data, moments, RegionOutcome::SolveFailed);
+        return estimate;
+    }
+    diagnostics.outcome = RegionOutcome::Kriged;
+    estimate.values = prediction.estimate;
+    colourErrors(estimate, data, moments, prediction);
+    return estimate;
+}
+
+}  // namespace vlx

@@ -1,0 +1,133 @@
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <string>
+
+#include "progress_bar.h"
+#include "tool_main.h"
+#include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
+#include "variolux/base/output_file.h"
+#include "variolux/base/parallel.h"
+#include "variolux/compare/gaussian.h"
+#include "variolux/reconstruct/mean.h"
+#include "variolux/reconstruct/paper.h"
+
+namespace {
+
+enum class Method { Paper, Mean, Gaussian };
+
+struct Options {
+    std::string dump;
+    std::string image;
+    Method method = Method::Paper;
+    double sigma = 1;
+    vlx::PaperOptions paper;
+    bool noColourDistance = false;
+    bool wholeImage = false;
+    bool diagnostics = false;
+    bool half = false;
+    bool json = false;
+    bool quiet = false;
+    int threads = 0;
+};
+
+void bind(CLI::App& app, Options& o) {
+    const std::map<std::string, Method> methods = {
+        {"paper", Method::Paper}, {"mean", Method::Mean}, {"gaussian", Method::Gaussian}};
+    app.add_option("dump", o.dump, "Sample dump (deep OpenEXR) to read")->required()->option_text("DUMP");
+    app.add_option("-o,--output", o.image, "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev")
+        ->required()
+        ->option_text("IMAGE");
+    auto* method = app.add_option("--method", o.method,
+                                  "paper: kriging by region (Yue and Nishita); mean: plain average of each pixel's "
+                                  "samples; gaussian: the average, Gaussian filtered")
+                       ->transform(CLI::CheckedTransformer(methods))
+                       ->option_text("paper|mean|gaussian [paper]");
+    app.add_option("--sigma", o.sigma, "Gaussian filter: standard deviation in pixels")
+        ->check(CLI::PositiveNumber)
+        ->option_text("PIXELS [1]")
+        ->needs(method);
+    auto* region = app.add_option("--region", o.paper.regionSize, "paper: side of a region in pixels")
+                       ->check(CLI::Range(1, 64))
+                       ->option_text("PIXELS [4]");
+    app.add_flag("--whole-image", o.wholeImage,
+                 "paper: the whole image is one region (for a few samples scattered over an image)")
+        ->excludes(region);
+    app.add_flag("--no-colour-distance", o.noColourDistance,
+                 "paper: distance on the image plane only, to show what the colour distance does");
+    app.add_flag("--diagnostics", o.diagnostics,
+                 "Also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) and "
+                 "IMAGE.json with everything about each region");
+    app.add_flag("--half", o.half, "Write 16-bit channels");
+    app.add_flag("--json", o.json, "Print the report as JSON on standard output");
+    app.add_flag("-q,--quiet", o.quiet, "Print nothing but errors");
+    app.add_option("--threads", o.threads, "Threads to use; pixels do not depend on it")
+        ->check(CLI::Range(0, 1024))
+        ->option_text("N [all]");
+}
+
+vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump, const vlx::Progress& progress) {
+    switch (o.method) {
+        case Method::Paper: return vlx::reconstructPaper(dump, o.paper, progress);
+        case Method::Mean: return vlx::reconstructMean(dump, progress);
+        case Method::Gaussian: break;
+    }
+    vlx::Reconstruction result = vlx::reconstructMean(dump, progress);
+    // The error of a filtered pixel is mostly bias, which this filter cannot know: no stddev layer.
+    vlx::Image radiance(result.image.data, {"R", "G", "B"});
+    radiance.display = result.image.display;
+    for (int row = 0; row < radiance.data.height; ++row)
+        for (int col = 0; col < radiance.data.width; ++col)
+            std::copy_n(result.image.at(col, row), 3, radiance.at(col, row));
+    result.image = vlx::gaussianFilter(radiance, o.sigma).image;
+    return result;
+}
+
+void writeText(const std::string& path, const std::string& text) {
+    vlx::OutputFile file(path);
+    std::ofstream stream(file.temporaryPath(), std::ios::binary);
+    stream << text;
+    stream.close();
+    if (!stream) throw vlx::Error(path, "writing failed");
+    file.commit();
+}
+
+int run(Options& o) {
+    o.paper.colourDistance = !o.noColourDistance;
+    if (o.wholeImage) o.paper.regionSize = 0;
+    if (o.method != Method::Paper && (o.diagnostics || o.noColourDistance || o.wholeImage))
+        throw CLI::ValidationError("--diagnostics, --no-colour-distance and --whole-image go with --method paper");
+
+    const vlx::ThreadLimit limit(o.threads);
+    const vlx::DumpReader dump(o.dump);
+    vlx::Reconstruction result = [&] {
+        vlx::ProgressBar bar("kriging");
+        return reconstruct(o, dump, bar);
+    }();
+    if (o.diagnostics) vlx::addDiagnosticLayers(result);
+
+    vlx::ImageWriteOptions write;
+    write.half = o.half;
+    write.attributes["Software"] = "vlx-krige";
+    vlx::writeImage(o.image, result.image, write);
+    if (o.diagnostics) writeText(o.image + ".json", vlx::toJson(result));
+
+    if (o.json)
+        std::printf("%s\n", vlx::toJson(result.report).c_str());
+    else if (!o.quiet)
+        std::fputs(vlx::toText(result.report).c_str(), stderr);
+    return vlx::kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Removes the noise of a path-traced image by kriging its samples, and says how accurate the result is.",
+                 "vlx-krige");
+    app.footer("Example: vlx-krige samples.exr -o image.exr");
+    Options options;
+    bind(app, options);
+    return vlx::runTool(argc, argv, app, [&] { return run(options); });
+}
