@@ -37,14 +37,16 @@ void bind(CLI::App& app, Options& o) {
     const std::map<std::string, Method> methods = {
         {"paper", Method::Paper}, {"mean", Method::Mean}, {"gaussian", Method::Gaussian}};
     app.add_option("dump", o.dump, "Sample dump (deep OpenEXR) to read")->required()->option_text("DUMP");
-    app.add_option("-o,--output", o.image, "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev")
+    app.add_option("-o,--output", o.image,
+                   "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev")
         ->required()
         ->option_text("IMAGE");
-    auto* method = app.add_option("--method", o.method,
-                                  "paper: kriging by region (Yue and Nishita); mean: plain average of each pixel's "
-                                  "samples; gaussian: the average, Gaussian filtered")
-                       ->transform(CLI::CheckedTransformer(methods))
-                       ->option_text("paper|mean|gaussian [paper]");
+    auto* method =
+        app.add_option("--method", o.method,
+                       "paper: kriging by region (Yue and Nishita); mean: plain average of each pixel's "
+                       "samples; gaussian: the average, Gaussian filtered")
+            ->transform(CLI::CheckedTransformer(methods))
+            ->option_text("paper|mean|gaussian [paper]");
     app.add_option("--sigma", o.sigma, "Gaussian filter: standard deviation in pixels")
         ->check(CLI::PositiveNumber)
         ->option_text("PIXELS [1]")
@@ -57,9 +59,10 @@ void bind(CLI::App& app, Options& o) {
         ->excludes(region);
     app.add_flag("--no-colour-distance", o.noColourDistance,
                  "paper: distance on the image plane only, to show what the colour distance does");
-    app.add_flag("--diagnostics", o.diagnostics,
-                 "Also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) and "
-                 "IMAGE.json with everything about each region");
+    app.add_flag(
+        "--diagnostics", o.diagnostics,
+        "Also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) and "
+        "IMAGE.json with everything about each region");
     app.add_flag("--half", o.half, "Write 16-bit channels");
     app.add_flag("--json", o.json, "Print the report as JSON on standard output");
     app.add_flag("-q,--quiet", o.quiet, "Print nothing but errors");
@@ -68,11 +71,15 @@ void bind(CLI::App& app, Options& o) {
         ->option_text("N [all]");
 }
 
-vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump, const vlx::Progress& progress) {
+vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
+                                const vlx::Progress& progress) {
     switch (o.method) {
-        case Method::Paper: return vlx::reconstructPaper(dump, o.paper, progress);
-        case Method::Mean: return vlx::reconstructMean(dump, progress);
-        case Method::Gaussian: break;
+        case Method::Paper:
+            return vlx::reconstructPaper(dump, o.paper, progress);
+        case Method::Mean:
+            return vlx::reconstructMean(dump, progress);
+        case Method::Gaussian:
+            break;
     }
     vlx::Reconstruction result = vlx::reconstructMean(dump, progress);
     // The error of a filtered pixel is mostly bias, which this filter cannot know: no stddev layer.
@@ -98,7 +105,8 @@ int run(Options& o) {
     o.paper.colourDistance = !o.noColourDistance;
     if (o.wholeImage) o.paper.regionSize = 0;
     if (o.method != Method::Paper && (o.diagnostics || o.noColourDistance || o.wholeImage))
-        throw CLI::ValidationError("--diagnostics, --no-colour-distance and --whole-image go with --method paper");
+        throw CLI::ValidationError(
+            "--diagnostics, --no-colour-distance and --whole-image go with --method paper");
 
     const vlx::ThreadLimit limit(o.threads);
     const vlx::DumpReader dump(o.dump);
@@ -124,8 +132,10 @@ int run(Options& o) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app("Removes the noise of a path-traced image by kriging its samples, and says how accurate the result is.",
-                 "vlx-krige");
+    CLI::App app(
+        "Removes the noise of a path-traced image by kriging its samples, and says how accurate the result "
+        "is.",
+        "vlx-krige");
     app.footer("Example: vlx-krige samples.exr -o image.exr");
     Options options;
     bind(app, options);

@@ -7,14 +7,13 @@ namespace vlx {
 
 namespace {
 
-/// Floor of a / b for b > 0, also for negative a: windows may start anywhere.
-int floorDivide(int a, int b) { return a / b - (a % b < 0 ? 1 : 0); }
-
 double secondsSince(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 }  // namespace
+
+int nextMultiple(int a, int step) { return (a / step - (a % step < 0 ? 1 : 0) + 1) * step; }
 
 ChannelChoice chooseChannels(const DumpHeader& header) {
     ChannelChoice choice;
@@ -39,14 +38,15 @@ Image makeOutputImage(const DumpHeader& header, const ChannelChoice& channels) {
     return image;
 }
 
-void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step, ReconstructionReport& report,
-                 const Progress& progress, const std::function<void(const SampleBand&)>& body) {
+void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step,
+                 ReconstructionReport& report, const Progress& progress,
+                 const std::function<void(const SampleBand&)>& body) {
     const Window& window = reader.header().data;
     const int end = window.y + window.height;
-    // Enough regions in flight to keep threads busy; little enough that a 32-spp 4K band stays near 100 MB.
-    const int rows = step * std::max(1, 8 / step);
     for (int y = window.y; y < end;) {
-        const int next = std::min(end, (floorDivide(y, step) * step) + rows);
+        // 16 rows: enough regions in flight to keep threads busy, and a 32-spp 4K band stays near 100 MB.
+        const int rows = step * std::max(1, 16 / std::max(step, 1));
+        const int next = step == 0 ? end : std::min(end, nextMultiple(y, step) - step + rows);
         const auto start = std::chrono::steady_clock::now();
         const SampleBand band = reader.read(y, next - y, channels.names);
         const double readTime = secondsSince(start);

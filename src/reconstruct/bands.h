@@ -24,10 +24,14 @@ ChannelChoice chooseChannels(const DumpHeader& header);
 /// An image of the dump's windows with R, G, B (A) and stddev.R, stddev.G, stddev.B.
 Image makeOutputImage(const DumpHeader& header, const ChannelChoice& channels);
 
-/// Reads the dump in bands of rows that start at multiples of `step` in raster coordinates (the first and the last may be
-/// shorter), each about a few megabytes of samples, and calls body(band). Adds what reading took to
-/// report.readSeconds and the samples to report.samples.
-void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step, ReconstructionReport& report,
-                 const Progress& progress, const std::function<void(const SampleBand&)>& body);
+/// The least multiple of `step` greater than `a`, which may be negative: windows may start anywhere.
+int nextMultiple(int a, int step);
+
+/// Reads the dump in bands of rows that start at multiples of `step` in raster coordinates (the first and the
+/// last may be shorter), step rows or a few times that, or all at once where step is 0, and calls body(band).
+/// Adds what reading took to report.readSeconds and the samples to report.samples.
+void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step,
+                 ReconstructionReport& report, const Progress& progress,
+                 const std::function<void(const SampleBand&)>& body);
 
 }  // namespace vlx

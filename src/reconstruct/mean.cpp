@@ -15,8 +15,8 @@ constexpr int kNeighbourhood = 4;
 
 /// Variance of one sample over the neighbourhood of a pixel that has too few of its own.
 Eigen::VectorXd borrowedVariance(const SampleBand& band, const BandLayout& layout, int column, int row) {
-    Window around{column - ((column % kNeighbourhood) + kNeighbourhood) % kNeighbourhood, band.y, kNeighbourhood,
-                  band.height};
+    Window around{column - ((column % kNeighbourhood) + kNeighbourhood) % kNeighbourhood, band.y,
+                  kNeighbourhood, band.height};
     const int right = std::min(around.x + around.width, band.x + band.width);
     around.x = std::max(around.x, band.x);
     around.width = right - around.x;

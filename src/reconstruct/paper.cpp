@@ -16,8 +16,10 @@ namespace vlx {
 namespace {
 
 constexpr int kColours = 3;        // R, G, B carry the variogram
+constexpr int kCellsPerPixel = 4;  // along each axis: 16 cells a pixel
 constexpr int kMinData = 3;        // a variogram needs two distances
 constexpr int kDistanceClasses = 12;
+constexpr double kMinExponent = 0.25;  // lower ones are a nugget in all but name
 
 /// The index of the pixel of the region that holds a position.
 int pixelOf(const Window& pixels, double x, double y) {
@@ -28,10 +30,10 @@ int pixelOf(const Window& pixels, double x, double y) {
 
 /// What a region's data say before any kriging.
 struct Moments {
-    Eigen::RowVectorXd mean;      // c: arithmetic mean of all samples
-    Eigen::VectorXd errors;       // n: error variance of each datum, summed over R, G, B
-    Eigen::Array3d spread;        // variance between the data, a colour
-    double signal = 0;            // spread less errors, summed over colours, >= 0
+    Eigen::RowVectorXd mean;  // c: arithmetic mean of all samples
+    Eigen::VectorXd errors;   // n: error variance of each datum, summed over R, G, B
+    Eigen::Array3d spread;    // variance between the data, a colour
+    double signal = 0;        // spread less errors, summed over colours, >= 0
 
     Moments(const RegionData& data)
         : mean(data.counts.transpose() * data.means / data.counts.sum()),
@@ -94,19 +96,37 @@ KrigingTargets pixelTargets(const RegionData& data, const Eigen::MatrixXd& colou
     return targets;
 }
 
-/// The region's arithmetic mean everywhere; its error from the samples' noise and what the data vary about it.
-void useMean(RegionEstimate& estimate, const RegionData& data, const Moments& moments, RegionOutcome outcome) {
+/// Section 4: the empirical variogram of the cell means, less their noise, in classes up to the region's
+/// diagonal (a singular value lies beyond it, and is left out), and the stable model fitted to it; near the
+/// origin it matters most, hence the weights.
+VariogramFit fitStableModel(const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours,
+                            const Eigen::VectorXd& errors, const Window& pixels) {
+    EmpiricalVariogramOptions classes;
+    classes.edges = uniformEdges(std::hypot(pixels.width, pixels.height), kDistanceClasses);
+    FitOptions options;
+    options.structures = {{.type = StructureType::Stable, .minShape = kMinExponent, .maxShape = 2}};
+    options.weights = FitWeights::PairsPerSquaredDistance;
+    options.search = FitSearch::Fast;
+    return fitVariogram(empiricalVariogram(positions, colours, classes, errors), options);
+}
+
+/// The region's arithmetic mean everywhere; its error from the samples' noise and what the data vary about
+/// it.
+void useMean(RegionEstimate& estimate, const RegionData& data, const Moments& moments,
+             RegionOutcome outcome) {
     estimate.diagnostics.outcome = outcome;
     estimate.values.rowwise() = moments.mean;
     for (int c = 0; c < kColours; ++c) {
         const double noise = data.sampleVariance[c] / data.counts.sum();
-        const double signal = std::max(0.0, moments.spread[c] - data.sampleVariance[c] * data.counts.cwiseInverse().mean());
-        estimate.stddev.col(c).setConstant(std::sqrt(noise + (outcome == RegionOutcome::NoStructure ? 0 : signal)));
+        const double signal =
+            std::max(0.0, moments.spread[c] - data.sampleVariance[c] * data.counts.cwiseInverse().mean());
+        estimate.stddev.col(c).setConstant(
+            std::sqrt(noise + (outcome == RegionOutcome::NoStructure ? 0 : signal)));
     }
 }
 
-/// Splits each target's kriging variance, which is for the sum of the colours, between them: the noise part by
-/// the weights exactly, the rest like the data's own variation.
+/// Splits each target's kriging variance, which is for the sum of the colours, between them: the noise part
+/// by the weights exactly, the rest like the data's own variation.
 void colourErrors(RegionEstimate& estimate, const RegionData& data, const Moments& moments,
                   const KrigingPrediction& prediction) {
     const Eigen::VectorXd noise = prediction.weights.array().square().matrix() * data.counts.cwiseInverse();
@@ -119,6 +139,32 @@ void colourErrors(RegionEstimate& estimate, const RegionData& data, const Moment
             estimate.stddev(p, c) = std::sqrt(signal + noise[p] * data.sampleVariance[c]);
         }
     }
+}
+
+/// The regions of a grid of `size` pixels through raster (0, 0), cut to the window.
+std::vector<Window> regionsOf(const Window& window, int size) {
+    std::vector<Window> regions;
+    for (int y = window.y; y < window.y + window.height; y = nextMultiple(y, size))
+        for (int x = window.x; x < window.x + window.width; x = nextMultiple(x, size))
+            regions.push_back({x, y, std::min(nextMultiple(x, size), window.x + window.width) - x,
+                               std::min(nextMultiple(y, size), window.y + window.height) - y});
+    return regions;
+}
+
+void store(const RegionEstimate& estimate, int radiance, Image& image) {
+    const Window& pixels = estimate.diagnostics.pixels;
+    for (int p = 0; p < pixels.pixels(); ++p) {
+        float* out =
+            image.at(pixels.x - image.data.x + p % pixels.width, pixels.y - image.data.y + p / pixels.width);
+        for (int c = 0; c < radiance; ++c) out[c] = static_cast<float>(estimate.values(p, c));
+        for (int c = 0; c < kColours; ++c) out[radiance + c] = static_cast<float>(estimate.stddev(p, c));
+    }
+}
+
+std::int64_t emptyPixels(const SampleBand& band) {
+    std::int64_t empty = 0;
+    for (std::size_t p = 0; p < band.pixels(); ++p) empty += band.offsets[p] == band.offsets[p + 1] ? 1 : 0;
+    return empty;
 }
 
 }  // namespace
@@ -160,9 +206,23 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
 
     KrigingProblem problem;
     problem.positions = composite(data.positions, differences, k);
-    // FIT
     problem.values = data.means;
     problem.errorVariances = moments.errors;
+
+    const VariogramFit fit = fitStableModel(problem.positions, differences, moments.errors, data.pixels);
+    if (!fit.ok() && fit.status != FitStatus::Zero) {
+        useMean(estimate, data, moments, RegionOutcome::FitFailed);
+        return estimate;
+    }
+    diagnostics.nugget = fit.model.nugget;
+    if (fit.status == FitStatus::Zero || fit.model.structures.front().sill == 0) {
+        useMean(estimate, data, moments, RegionOutcome::NoStructure);
+        return estimate;
+    }
+    diagnostics.sill = fit.model.structures.front().sill;
+    diagnostics.range = fit.model.structures.front().range;
+    diagnostics.exponent = fit.model.structures.front().shape;
+    problem.model = fit.model;
 
     const KrigingSystem system(problem);
     diagnostics.condition = system.report().conditionEstimate;
@@ -181,6 +241,45 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     estimate.values = prediction.estimate;
     colourErrors(estimate, data, moments, prediction);
     return estimate;
+}
+
+Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& options,
+                                const Progress& progress) {
+    if (const auto broken = options.validate()) throw Error("", *broken);
+    const DumpHeader& header = dump.header();
+    const ChannelChoice channels = chooseChannels(header);
+    const int radiance = channels.radianceCount();
+    const bool whole = options.regionSize == 0;
+
+    Reconstruction result;
+    result.image = makeOutputImage(header, channels);
+    const auto reconstructBand = [&](const SampleBand& band) {
+        const std::vector<Window> regions =
+            whole ? std::vector<Window>{header.data}
+                  : regionsOf(Window{band.x, band.y, band.width, band.height}, options.regionSize);
+        std::vector<RegionDiagnostics> diagnostics(regions.size());
+        std::vector<std::int64_t> dropped(regions.size());
+        parallelFor(0, static_cast<std::int64_t>(regions.size()), [&](std::int64_t i) {
+            const auto index = static_cast<std::size_t>(i);
+            const RegionData data = gatherRegion(band, channels.layout, regions[index], kCellsPerPixel);
+            if (data.size() > kMaxRegionData)
+                throw Error(dump.path(), "a region holds " + std::to_string(data.size()) + " data, at most " +
+                                             std::to_string(kMaxRegionData) + " can be kriged together");
+            const RegionEstimate estimate = krigeRegion(data, options);
+            store(estimate, radiance, result.image);
+            diagnostics[index] = estimate.diagnostics;
+            dropped[index] = data.dropped;
+        });
+        for (std::size_t i = 0; i < regions.size(); ++i) {
+            ++result.report.regions[static_cast<std::size_t>(diagnostics[i].outcome)];
+            result.report.droppedSamples += dropped[i];
+            result.report.jitteredSystems += diagnostics[i].jitter > 0 ? 1 : 0;
+        }
+        result.report.emptyPixels += emptyPixels(band);
+        result.regions.insert(result.regions.end(), diagnostics.begin(), diagnostics.end());
+    };
+    forEachBand(dump, channels, options.regionSize, result.report, progress, reconstructBand);
+    return result;
 }
 
 }  // namespace vlx

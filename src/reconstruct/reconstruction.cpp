@@ -10,7 +10,8 @@ namespace {
 nlohmann::ordered_json json(const ReconstructionReport& report) {
     nlohmann::ordered_json regions = nlohmann::ordered_json::object();
     for (int i = 0; i < kRegionOutcomes; ++i)
-        regions[std::string(name(static_cast<RegionOutcome>(i)))] = report.regions[static_cast<std::size_t>(i)];
+        regions[std::string(name(static_cast<RegionOutcome>(i)))] =
+            report.regions[static_cast<std::size_t>(i)];
     return {{"samples", report.samples},
             {"droppedSamples", report.droppedSamples},
             {"emptyPixels", report.emptyPixels},
@@ -24,13 +25,20 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
 
 std::string_view name(RegionOutcome outcome) {
     switch (outcome) {
-        case RegionOutcome::Kriged: return "kriged";
-        case RegionOutcome::NoStructure: return "no structure";
-        case RegionOutcome::TooFewData: return "too few data";
-        case RegionOutcome::AllEqual: return "all equal";
-        case RegionOutcome::FitFailed: return "fit failed";
-        case RegionOutcome::SolveFailed: return "solve failed";
-        case RegionOutcome::Empty: return "empty";
+        case RegionOutcome::Kriged:
+            return "kriged";
+        case RegionOutcome::NoStructure:
+            return "no structure";
+        case RegionOutcome::TooFewData:
+            return "too few data";
+        case RegionOutcome::AllEqual:
+            return "all equal";
+        case RegionOutcome::FitFailed:
+            return "fit failed";
+        case RegionOutcome::SolveFailed:
+            return "solve failed";
+        case RegionOutcome::Empty:
+            return "empty";
     }
     return "";
 }
@@ -91,8 +99,8 @@ void addDiagnosticLayers(Reconstruction& reconstruction) {
         for (int row = r.pixels.y; row < r.pixels.y + r.pixels.height; ++row)
             for (int col = r.pixels.x; col < r.pixels.x + r.pixels.width; ++col) {
                 float* values = image.at(col - image.data.x, row - image.data.y) + old.channelCount();
-                for (const double value : {r.nugget, r.sill, r.range, r.exponent, r.errorVariance,
-                                           static_cast<double>(r.outcome)})
+                for (const double value :
+                     {r.nugget, r.sill, r.range, r.exponent, r.errorVariance, static_cast<double>(r.outcome)})
                     *values++ = static_cast<float>(value);
             }
     reconstruction.image = std::move(image);

@@ -20,8 +20,8 @@ struct Pooled {
     double samples = 0;
 };
 
-Pooled poolWithinGroups(const std::vector<double>& count, const Eigen::ArrayXXd& sum, const Eigen::ArrayXXd& square,
-                        int gridWidth, int gridHeight, int group) {
+Pooled poolWithinGroups(const std::vector<double>& count, const Eigen::ArrayXXd& sum,
+                        const Eigen::ArrayXXd& square, int gridWidth, int gridHeight, int group) {
     const Eigen::Index channels = sum.rows();
     Pooled pooled;
     pooled.squares = Eigen::VectorXd::Zero(channels);
@@ -47,7 +47,8 @@ Pooled poolWithinGroups(const std::vector<double>& count, const Eigen::ArrayXXd&
 
 }  // namespace
 
-RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const Window& region, int cellsPerPixel) {
+RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const Window& region,
+                        int cellsPerPixel) {
     assert(region.x >= band.x && region.x + region.width <= band.x + band.width);
     assert(region.y >= band.y && region.y + region.height <= band.y + band.height);
     const bool positioned = layout.x >= 0 && layout.y >= 0;
@@ -67,12 +68,13 @@ RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const 
 
     for (int row = region.y; row < region.y + region.height; ++row)
         for (int column = region.x; column < region.x + region.width; ++column) {
-            const std::size_t pixel = static_cast<std::size_t>(row - band.y) * static_cast<std::size_t>(band.width) +
-                                      static_cast<std::size_t>(column - band.x);
+            const std::size_t pixel =
+                static_cast<std::size_t>(row - band.y) * static_cast<std::size_t>(band.width) +
+                static_cast<std::size_t>(column - band.x);
             for (std::uint64_t s = band.offsets[pixel]; s < band.offsets[pixel + 1]; ++s) {
                 for (Eigen::Index c = 0; c < channels; ++c)
-                    z[c] = static_cast<double>(
-                        band.values[static_cast<std::size_t>(layout.radiance[static_cast<std::size_t>(c)])][s]);
+                    z[c] = static_cast<double>(band.values[static_cast<std::size_t>(
+                        layout.radiance[static_cast<std::size_t>(c)])][s]);
                 int cx = 0, cy = 0;
                 bool usable = z.isFinite().all();
                 if (positioned && usable) {
@@ -90,14 +92,16 @@ RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const 
                 }
                 if (data.samples++ == 0) reference = z;
                 z -= reference;
-                const int cell = ((row - region.y) * cells + cy) * gridWidth + (column - region.x) * cells + cx;
+                const int cell =
+                    ((row - region.y) * cells + cy) * gridWidth + (column - region.x) * cells + cx;
                 count[static_cast<std::size_t>(cell)] += 1;
                 sum.col(cell) += z;
                 square.col(cell) += z * z;
             }
         }
 
-    const auto n = static_cast<Eigen::Index>(std::count_if(count.begin(), count.end(), [](double k) { return k > 0; }));
+    const auto n =
+        static_cast<Eigen::Index>(std::count_if(count.begin(), count.end(), [](double k) { return k > 0; }));
     data.positions.resize(n, 2);
     data.means.resize(n, channels);
     data.counts.resize(n);

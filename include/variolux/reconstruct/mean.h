@@ -6,11 +6,11 @@
 
 namespace vlx {
 
-/// The plain average of each pixel's samples (a box filter of one pixel): what every renderer writes, and what
-/// reconstruction must beat. stddev is the standard error of the mean, sqrt(s^2 / n) with the unbiased sample
-/// variance s^2; a pixel of one sample borrows s^2 from the pixels of its 4 x 4 neighbourhood on the raster (their
-/// pooled variance, or else the variance between them). A pixel without samples is zero and counted. Non-finite
-/// samples are dropped and counted. Throws as DumpReader.
+/// The plain average of each pixel's samples (a box filter of one pixel): what every renderer writes, and
+/// what reconstruction must beat. stddev is the standard error of the mean, sqrt(s^2 / n) with the unbiased
+/// sample variance s^2; a pixel of one sample borrows s^2 from the pixels of its 4 x 4 neighbourhood on the
+/// raster (their pooled variance, or else the variance between them). A pixel without samples is zero and
+/// counted. Non-finite samples are dropped and counted. Throws as DumpReader.
 Reconstruction reconstructMean(const DumpReader& dump, const Progress& progress = {});
 
 }  // namespace vlx

@@ -13,7 +13,8 @@
 namespace vlx {
 
 struct PaperOptions {
-    /// Side of the square regions in pixels, on a raster grid through (0, 0); 0: the whole image is one region.
+    /// Side of the square regions in pixels, on a raster grid through (0, 0); 0: the whole image is one
+    /// region.
     int regionSize = 4;
     /// Join the distance in colour space with the distance on the image plane.
     bool colourDistance = true;
@@ -32,18 +33,19 @@ struct RegionEstimate {
     RegionDiagnostics diagnostics;
 };
 
-/// Krige one region. The first three columns of `data.means` are R, G, B; they carry the variogram; further columns
-/// are estimated with the same weights.
+/// Krige one region. The first three columns of `data.means` are R, G, B; they carry the variogram; further
+/// columns are estimated with the same weights.
 ///
 /// 1. Dissimilarity of two data (section 4): half the squared norm of their RGB difference, less the mean of
 ///    their error variances s^2/n: what noise adds is known and taken off, not fitted.
 /// 2. A stable model gamma(h) = c0 + c (1 - exp(-(h/r)^alpha)) is fitted to it in distance classes.
-/// 3. Composite distance (section 6): h^2 = dx^2 + dy^2 + k^2 |dz|^2 with dz the difference of two RGB estimates, each
+/// 3. Composite distance (section 6): h^2 = dx^2 + dy^2 + k^2 |dz|^2 with dz the difference of two RGB
+/// estimates, each
 ///    taken from the region's arithmetic mean m. A datum's estimate is its mean; a target's is its pixel's
-///    arithmetic mean, drawn towards m by how much of it is noise: m + (pixel mean - m) S / (S + e), with S the
-///    variance between the region's data less their errors, e the error variance of the pixel mean. k makes one
-///    standard deviation of the region's data as long as one pixel: a singular value, many deviations away
-///    from all others, loses its weight.
+///    arithmetic mean, drawn towards m by how much of it is noise: m + (pixel mean - m) S / (S + e), with S
+///    the variance between the region's data less their errors, e the error variance of the pixel mean. k
+///    makes one standard deviation of the region's data as long as one pixel: a singular value, many
+///    deviations away from all others, loses its weight.
 /// 4. The system (11), in covariance form (the errors with a plus on the diagonal of the covariances), is
 ///    factorised once; a pixel's estimate is the mean over its cells of the kriged field (a block target).
 ///
@@ -53,6 +55,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options);
 
 /// The method over a whole dump, region by region. Deterministic for any number of threads.
 /// Throws as DumpReader; Error when options are invalid or a region holds more than kMaxRegionData cells.
-Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& options, const Progress& progress = {});
+Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& options,
+                                const Progress& progress = {});
 
 }  // namespace vlx

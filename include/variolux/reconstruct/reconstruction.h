@@ -10,8 +10,8 @@
 
 namespace vlx {
 
-/// How a region of the image got its values. Everything but Kriged is a fallback or a special case, counted in the
-/// report and drawn in the diagnostic layer `diagnostics.outcome` (the number of the enumerator).
+/// How a region of the image got its values. Everything but Kriged is a fallback or a special case, counted
+/// in the report and drawn in the diagnostic layer `diagnostics.outcome` (the number of the enumerator).
 enum class RegionOutcome {
     Kriged,       ///< a variogram was fitted and the system solved
     NoStructure,  ///< the fitted partial sill is zero: kriging is then the weighted mean of the region's data
@@ -30,33 +30,33 @@ std::string_view name(RegionOutcome outcome);
 struct RegionDiagnostics {
     Window pixels;
     RegionOutcome outcome = RegionOutcome::Empty;
-    int data = 0;               ///< data of the kriging system
-    std::int64_t samples = 0;   ///< samples that went into them
-    double nugget = 0;          ///< of the fitted model; squared radiance, summed over R, G, B
-    double sill = 0;            ///< partial sill, same unit
-    double range = 0;           ///< pixels (of composite distance when that is on)
-    double exponent = 0;        ///< alpha of the stable model
-    double errorVariance = 0;   ///< of one sample: pooled residual variance, summed over R, G, B
-    double colourScale = 0;     ///< pixels of composite distance a unit of radiance; 0 when off
-    double condition = 0;       ///< estimated condition number of the system, 0 where none was solved
-    double jitter = 0;          ///< relative diagonal jitter that the solver had to add; 0 normally
+    int data = 0;              ///< data of the kriging system
+    std::int64_t samples = 0;  ///< samples that went into them
+    double nugget = 0;         ///< of the fitted model; squared radiance, summed over R, G, B
+    double sill = 0;           ///< partial sill, same unit
+    double range = 0;          ///< pixels (of composite distance when that is on)
+    double exponent = 0;       ///< alpha of the stable model
+    double errorVariance = 0;  ///< of one sample: pooled residual variance, summed over R, G, B
+    double colourScale = 0;    ///< pixels of composite distance a unit of radiance; 0 when off
+    double condition = 0;      ///< estimated condition number of the system, 0 where none was solved
+    double jitter = 0;         ///< relative diagonal jitter that the solver had to add; 0 normally
 };
 
 /// What a run did, for people and machines.
 struct ReconstructionReport {
     std::array<std::int64_t, kRegionOutcomes> regions{};  ///< count by RegionOutcome
-    std::int64_t samples = 0;           ///< samples read
-    std::int64_t droppedSamples = 0;    ///< non-finite radiance: left out
-    std::int64_t emptyPixels = 0;       ///< pixels without a usable sample of their own
-    std::int64_t jitteredSystems = 0;   ///< kriging systems that needed jitter
-    double readSeconds = 0;             ///< wall time in the reader
-    double solveSeconds = 0;            ///< wall time of everything else
+    std::int64_t samples = 0;                             ///< samples read
+    std::int64_t droppedSamples = 0;                      ///< non-finite radiance: left out
+    std::int64_t emptyPixels = 0;                         ///< pixels without a usable sample of their own
+    std::int64_t jitteredSystems = 0;                     ///< kriging systems that needed jitter
+    double readSeconds = 0;                               ///< wall time in the reader
+    double solveSeconds = 0;                              ///< wall time of everything else
 };
 
 /// A reconstructed image with what there is to know about it.
 struct Reconstruction {
-    /// R, G, B, A when the dump has it, stddev.R, stddev.G, stddev.B: the standard deviation of the estimate's error;
-    /// with diagnostics, layers diagnostics.* follow.
+    /// R, G, B, A when the dump has it, stddev.R, stddev.G, stddev.B: the standard deviation of the
+    /// estimate's error; with diagnostics, layers diagnostics.* follow.
     Image image;
     std::vector<RegionDiagnostics> regions;  ///< row by row; empty for methods without regions
     ReconstructionReport report;
