@@ -65,6 +65,10 @@ double covariance(const VariogramModel& model, double h);
 /// the derivative by an unused shape is 0. h >= 0.
 Eigen::VectorXd semivarianceGradient(const VariogramModel& model, double h);
 
+/// The unit structure 1 - rho(u) at u = h / range >= 0, for callers that fill matrices of one structure;
+/// Linear gives u. `shape` as in VariogramStructure. Same accuracy as semivariance().
+double unitSemivariance(StructureType type, double shape, double u);
+
 /// Geometric anisotropy in the plane: coordinates are rotated so that `angle` (radians, counter-clockwise
 /// from +x) becomes the first axis, then the second axis is stretched by 1 / ratio, so that a model with
 /// range a along `angle` has range a * ratio across it. 0 < ratio.
