@@ -1,0 +1,176 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+/// The linear algebra of kriging, for covariances that the caller has already computed. KrigingSystem
+/// (kriging.h) fills these matrices from positions and a variogram model; use this level for a covariance of
+/// your own.
+///
+/// Every kind of kriging is one problem: data z with E[z] = F beta and Var[z] = K (error variances on its
+/// diagonal), a target with E = f0' beta, variance C00 and covariances c0 with the data. The best linear
+/// unbiased estimate is w'z, where the weights minimise the kriging variance
+///     sigma^2 = C00 - 2 w'c0 + w'K w      subject to   F'w = f0
+/// (Matheron 1969; Cressie 1993, section 3.4; Chiles and Delfiner 2012, section 3.4):
+///   F has no columns        simple kriging (values are residuals from the known mean)
+///   one column of ones      ordinary kriging
+///   polynomials             universal kriging
+///   any other functions     kriging with external drift
+///   c0 = 0, C00 = 0         the drift f0'beta itself: kriging of the mean (generalised least squares)
+///
+/// How it is solved. The bordered matrix [K F; F' 0] is indefinite; this class never forms it:
+///   1. Equilibrate, D K D with D = 2^-round(log2(K_ii) / 2): error variances of 1e-12 beside 1e12 are
+///      harmless (van der Sluis 1969), and powers of two round nothing.
+///   2. Cholesky, D K D = L L'. Accepted when the smallest squared pivot is above rounding noise.
+///      Otherwise a relative jitter goes on the unit diagonal, from eps n upwards in powers of ten, and is
+///      reported; weights are then refined against the matrix without jitter.
+///   3. The drift by pivoted QR, L^-1 D F P = Q R, its columns centred and scaled beforehand.
+///      Dependent columns are dropped and reported; a target whose drift can still be estimated is exact,
+///      any other is flagged.
+///   4. Weights from two triangular solves; one step of iterative refinement where the condition number asks
+///      for it; the variance from the quadratic form above, in which errors of w enter squared.
+namespace vlx {
+
+enum class KrigingStatus {
+    Ok,            ///< predictions are valid; fallbacks, if any, are listed in the report
+    InvalidInput,  ///< a value, variance, position or parameter is not usable: `message` names it
+    TooFewData,    ///< no data, and no known mean to fall back to
+};
+
+/// Double: the factor is double. Single: the factor is float where the condition estimate allows it, with
+/// refinement by residuals in double until the weights are as good as the double factor's; where it does not,
+/// or refinement does not converge, the factor is double and the report says so.
+enum class KrigingPrecision { Double, Single };
+
+/// What building a system found. Anything but zero or false below is a documented fallback, meant to be
+/// counted.
+struct KrigingReport {
+    KrigingStatus status = KrigingStatus::Ok;
+    std::string message;  ///< in words: the error, or the fallbacks taken; empty if none
+
+    Eigen::Index used = 0;     ///< rows of the factorised system
+    Eigen::Index merged = 0;   ///< data that were folded into a coincident one
+    Eigen::Index ignored = 0;  ///< data of infinite error variance
+    int droppedDrift = 0;      ///< linearly dependent drift columns
+    double jitter = 0;         ///< added to the unit diagonal (relative to each datum's variance)
+    bool indefinite = false;   ///< the jitter needed exceeds rounding: the covariances are not a covariance
+    bool degenerate = false;   ///< some datum has no variance at all (zero sill and zero error)
+    bool generalisedCovariance = false;  ///< increments instead of covariances: long ranges, unbounded models
+    bool singlePrecision = false;        ///< the factor in use is float
+    double conditionEstimate = 0;        ///< of the equilibrated matrix, usually within a factor n
+
+    bool ok() const { return status == KrigingStatus::Ok; }
+};
+
+enum class TargetStatus {
+    Ok,
+    Exact,          ///< the target is bitwise at an error-free datum: its value, variance 0
+    NotEstimable,   ///< its drift is outside what the data determine: the estimate uses the kept columns only
+    InvalidTarget,  ///< a coordinate, drift or covariance is not finite: estimate and variance are NaN
+};
+
+struct KrigingPrediction {
+    Eigen::MatrixXd estimate;          ///< targets x value columns
+    Eigen::VectorXd variance;          ///< kriging variance of each target, >= 0 always
+    Eigen::MatrixXd weights;           ///< targets x data; empty unless asked for
+    std::vector<TargetStatus> status;  ///< of each target
+    double lowestVariance = 0;         ///< the most negative variance before clamping at 0: rounding, <= 0
+};
+
+struct PredictOptions {
+    bool weights = false;  ///< return the weights too
+};
+
+/// Generalised least squares: beta and its covariance matrix.
+struct DriftEstimate {
+    Eigen::MatrixXd coefficients;  ///< drift columns x value columns; 0 for dropped columns
+    Eigen::MatrixXd covariance;    ///< drift columns x drift columns
+};
+
+struct LeaveOneOut {
+    Eigen::MatrixXd estimate;          ///< data x value columns: datum i from all others
+    Eigen::VectorXd variance;          ///< of the residual z_i - estimate_i (the datum's own error included)
+    std::vector<TargetStatus> status;  ///< NotEstimable: the others do not determine the drift there (NaN)
+};
+
+struct CovarianceProblem {
+    Eigen::MatrixXd covariance;  ///< K, n x n, error variances on the diagonal; only the lower half is read
+    Eigen::MatrixXd drift;       ///< F, n x p; p = 0 for simple kriging
+    Eigen::MatrixXd values;      ///< z, n x c: one factorisation serves all columns
+    KrigingPrecision precision = KrigingPrecision::Double;
+};
+
+/// The targets of CovarianceSystem::predict, one a column of `covariance`.
+struct CovarianceTargets {
+    Eigen::MatrixXd covariance;  ///< c0, n x m: with the data, never with error variances
+    Eigen::MatrixXd drift;       ///< f0, m x p
+    Eigen::VectorXd variance;    ///< C00, m
+    /// Empty, or for each target the datum whose value it is by definition (same place, no error), or -1.
+    std::vector<Eigen::Index> exactDatum;
+};
+
+/// A factorised kriging system. Building costs n^3 / 3 flops, a target 2 n^2 to 6 n^2. Immutable; safe to
+/// share between threads. All results depend on the input alone, bit by bit.
+class CovarianceSystem {
+  public:
+    CovarianceSystem() = default;
+
+    /// Never throws for bad numbers: see report().status.
+    explicit CovarianceSystem(CovarianceProblem problem);
+
+    const KrigingReport& report() const { return report_; }
+
+    /// Estimates, variances and weights. If !report().ok(), or shapes do not match, every target is
+    /// InvalidTarget.
+    KrigingPrediction predict(const CovarianceTargets& targets, const PredictOptions& options = {}) const;
+
+    /// Kriging of the mean: beta = (F'K^-1 F)^-1 F'K^-1 z with covariance (F'K^-1 F)^-1.
+    DriftEstimate drift() const;
+
+    /// Every datum predicted from all others, from this factorisation (Dubrule 1983):
+    ///     z_i - estimate_i = (Q z)_i / Q_ii,   variance_i = 1 / Q_ii,
+    ///     Q = K^-1 - K^-1 F (F'K^-1 F)^-1 F'K^-1.
+    LeaveOneOut leaveOneOut() const;
+
+  private:
+    /// Targets' drift in the factorised basis, and whether it can be estimated.
+    struct TargetDrift {
+        Eigen::MatrixXd kept;         // rank x m
+        Eigen::RowVectorXd constant;  // m: multiple of the constant function
+        std::vector<bool> estimable;
+    };
+
+    bool validate(const CovarianceProblem& problem);
+    void equilibrate(const Eigen::MatrixXd& covariance);
+    void factorise();
+    void decomposeDrift(const Eigen::MatrixXd& drift);
+    void centreValues();
+    void describe();
+    TargetDrift targetDrift(const Eigen::MatrixXd& drift) const;
+    void solveLower(Eigen::MatrixXd& x) const;
+    void solveUpper(Eigen::MatrixXd& x) const;
+    /// Equilibrated weights for right-hand sides c0 (n x m) and kept drift f0 (rank x m), refined.
+    Eigen::MatrixXd solve(const Eigen::MatrixXd& c0, const Eigen::MatrixXd& f0) const;
+
+    KrigingReport report_;
+    Eigen::MatrixXd covariance_;  // D K D, both halves, without jitter
+    Eigen::VectorXd scale_;       // D
+    Eigen::MatrixXd factor_;      // L of the accepted matrix
+
+    // Internal drift column j = (F_j - centre_j F_constant) * columnScale_j.
+    Eigen::Index driftColumns_ = 0;
+    Eigen::Index constantColumn_ = -1;  // of F, -1 if none
+    double constant_ = 1;               // its value
+    Eigen::RowVectorXd centre_, columnScale_;
+    Eigen::MatrixXd keptDrift_;                 // n x rank: D F in the internal basis, kept columns
+    Eigen::MatrixXd q_, r_;                     // L^-1 keptDrift_ = Q R
+    Eigen::MatrixXd dependence_;                // dropped columns = kept columns * dependence_
+    std::vector<Eigen::Index> kept_, dropped_;  // columns of F
+
+    Eigen::MatrixXd rawValues_;
+    Eigen::MatrixXd values_;  // D (z - reference) / valueScale
+    Eigen::RowVectorXd reference_, valueScale_;
+};
+
+}  // namespace vlx
