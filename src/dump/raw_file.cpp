@@ -32,20 +32,18 @@ std::uint64_t RawFile::size() const {
     return static_cast<std::uint64_t>(status.st_size);
 }
 
-Bytes RawFile::readAt(std::uint64_t position, std::uint64_t count) const {
-    Bytes bytes(count);
-    for (std::size_t done = 0; done < bytes.size();) {
-        const ssize_t got = ::pread(descriptor_, bytes.data() + done, bytes.size() - done,
-                                    static_cast<off_t>(position + done));
+void RawFile::readAt(std::uint64_t position, std::span<unsigned char> to) const {
+    for (std::size_t done = 0; done < to.size();) {
+        const ssize_t got =
+            ::pread(descriptor_, to.data() + done, to.size() - done, static_cast<off_t>(position + done));
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) refuse("reading");
         if (got == 0) throw Error(name_, "truncated: the file became shorter while it was read");
         done += static_cast<std::size_t>(got);
     }
-    return bytes;
 }
 
-void RawFile::writeAt(std::uint64_t position, const Bytes& bytes) const {
+void RawFile::writeAt(std::uint64_t position, std::span<const unsigned char> bytes) const {
     for (std::size_t done = 0; done < bytes.size();) {
         const ssize_t put = ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done,
                                      static_cast<off_t>(position + done));

@@ -20,8 +20,9 @@ class RawFile {
 
     const std::string& name() const { return name_; }
     std::uint64_t size() const;
-    Bytes readAt(std::uint64_t position, std::uint64_t count) const;
-    void writeAt(std::uint64_t position, const Bytes& bytes) const;
+    /// All bytes of `to`, from `position` on.
+    void readAt(std::uint64_t position, std::span<unsigned char> to) const;
+    void writeAt(std::uint64_t position, std::span<const unsigned char> bytes) const;
     /// Reports write errors that come late; the destructor closes too, silently.
     void close();
 

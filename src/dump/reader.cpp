@@ -3,11 +3,13 @@
 #include <Imath/half.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 
 #include "exr_header.h"
 #include "little_endian.h"
+#include "pool.h"
 #include "raw_file.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
@@ -35,6 +37,13 @@ struct Chunk {
     std::uint64_t samples() const { return ends.back(); }
 };
 
+// Memory of a task.
+struct Scratch {
+    explicit Scratch(DumpCompression compression) : unpacker(compression) {}
+    Unpacker unpacker;
+    Bytes packed;
+};
+
 // A channel as read() gives it, and where its values are among those of a row.
 struct Source {
     ChannelType type = ChannelType::Float;
@@ -60,7 +69,8 @@ struct DumpReader::Impl {
 
     FileHeader readHeader() const {
         for (std::uint64_t size = kFirstRead;; size *= 2) {
-            const Bytes start = file.readAt(0, std::min(size, fileBytes));
+            Bytes start(std::min(size, fileBytes));
+            file.readAt(0, start);
             if (auto decoded = decodeHeader(file.name(), start, fileBytes)) return *decoded;
             if (size >= kMaxHeader) throw Error(file.name(), "damaged header: it does not end");
         }
@@ -79,6 +89,13 @@ struct DumpReader::Impl {
                                          std::to_string(std::int64_t{y} + rows - 1));
     }
 
+    std::span<const unsigned char> read(std::uint64_t position, std::uint64_t count, Scratch& scratch) const {
+        if (scratch.packed.size() < count) scratch.packed.resize(count);
+        const std::span<unsigned char> bytes(scratch.packed.data(), count);
+        file.readAt(position, bytes);
+        return bytes;
+    }
+
     // The head and the sample counts of the chunk of row y.
     Chunk readCounts(int y, std::uint64_t position) const {
         if (position == 0) damaged(y, "missing: the file was not finished");
@@ -86,7 +103,8 @@ struct DumpReader::Impl {
         if (position > fileBytes || head > fileBytes - position)
             damaged(y, "truncated: it should start at byte " + std::to_string(position) + ", the file has " +
                            std::to_string(fileBytes));
-        const Bytes bytes = file.readAt(position, head);
+        std::array<unsigned char, kDeepChunkHead + kPartNumber> bytes{};
+        file.readAt(position, {bytes.data(), head});
         const unsigned char* at = bytes.data();
         if (header.multiPart) {
             if (static_cast<std::int32_t>(loadWord(at)) != header.part)
@@ -117,7 +135,9 @@ struct DumpReader::Impl {
             damaged(y, "damaged: " + std::to_string(chunk.packedBytes) + " bytes cannot unpack to " +
                            std::to_string(chunk.rawBytes));
 
-        const auto unpacked = unpack(compression, file.readAt(chunk.counts, chunk.countsBytes), 4 * width);
+        const auto scratch = pool.borrow();
+        const auto unpacked =
+            scratch->unpacker.unpack(read(chunk.counts, chunk.countsBytes, *scratch), 4 * width);
         if (!unpacked) damaged(y, "damaged: its sample counts do not unpack");
         chunk.ends.resize(width);
         std::uint32_t last = 0;
@@ -138,7 +158,8 @@ struct DumpReader::Impl {
     std::vector<Chunk> readCounts(int y, int rows) const {
         checkRows(y, rows);
         const auto first = static_cast<std::uint64_t>(std::int64_t{y} - header.dump.data.y);
-        const Bytes table = file.readAt(header.chunkTable + 8 * first, 8 * static_cast<std::uint64_t>(rows));
+        Bytes table(8 * static_cast<std::size_t>(rows));
+        file.readAt(header.chunkTable + 8 * first, table);
         std::vector<Chunk> chunks(static_cast<std::size_t>(rows));
         parallelFor(0, rows, [&](std::int64_t row) {
             chunks[static_cast<std::size_t>(row)] =
@@ -155,6 +176,7 @@ struct DumpReader::Impl {
     const RawFile file;
     const std::uint64_t fileBytes;
     const FileHeader header;
+    mutable Pool<Scratch> pool{[this] { return std::make_unique<Scratch>(header.dump.compression); }};
 };
 
 DumpReader::DumpReader(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
@@ -200,9 +222,9 @@ SampleBand DumpReader::read(int y, int rows, const std::vector<std::string>& cha
     for (auto& values : band.values) values.resize(total);
     parallelFor(0, rows, [&](std::int64_t row) {
         const Chunk& chunk = chunks[static_cast<std::size_t>(row)];
-        const auto raw =
-            unpack(dump.compression, impl_->file.readAt(chunk.counts + chunk.countsBytes, chunk.packedBytes),
-                   chunk.rawBytes);
+        const auto scratch = impl_->pool.borrow();
+        const auto raw = scratch->unpacker.unpack(
+            impl_->read(chunk.counts + chunk.countsBytes, chunk.packedBytes, *scratch), chunk.rawBytes);
         if (!raw) impl_->damaged(chunk.y, "damaged: its samples do not unpack");
         for (std::size_t c = 0; c < sources.size(); ++c)
             widen(raw->data() + sources[c].bytesBefore * chunk.samples(), sources[c].type, chunk.samples(),

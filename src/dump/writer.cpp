@@ -16,6 +16,7 @@
 
 #include "exr_header.h"
 #include "little_endian.h"
+#include "pool.h"
 #include "raw_file.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
@@ -89,6 +90,16 @@ float pixelMean(const float* values, const float* hits, std::uint64_t begin, std
         }
     return count > 0 ? static_cast<float>(sum / count) : 0.0f;
 }
+
+// Memory of a task, and what it makes; kept from band to band.
+struct Scratch {
+    explicit Scratch(DumpCompression compression) : packer(compression) {}
+    Packer packer;
+    Bytes values;
+};
+struct RowChunks {
+    Bytes beauty, samples;
+};
 
 DumpHeader sortedByName(DumpHeader header) {
     std::sort(header.channels.begin(), header.channels.end(),
@@ -242,82 +253,80 @@ struct DumpWriter::Impl {
     }
 
     void writeBand(const SampleBand& band) {
-        struct Row {
-            Bytes beauty, samples;
-        };
-        std::vector<Row> rows(static_cast<std::size_t>(band.height));
+        const auto rows = static_cast<std::size_t>(band.height);
+        if (chunks.size() < rows) chunks.resize(rows);
         parallelFor(0, band.height, [&](std::int64_t row) {
             const CpuTimer timer(cpu);
-            rows[static_cast<std::size_t>(row)] = {beautyChunk(band, static_cast<int>(row)),
-                                                   samplesChunk(band, static_cast<int>(row))};
+            RowChunks& to = chunks[static_cast<std::size_t>(row)];
+            const auto scratch = pool.borrow();
+            encodeBeauty(band, static_cast<int>(row), *scratch, to.beauty);
+            encodeSamples(band, static_cast<int>(row), *scratch, to.samples);
         });
         const CpuTimer timer(cpu);
         for (std::size_t p = 0; p < band.pixels(); ++p)
             maxSamples = std::max(maxSamples, band.offsets[p + 1] - band.offsets[p]);
         Bytes beautyPositions, samplesPositions;
-        const std::uint64_t firstRow = static_cast<std::uint64_t>(std::int64_t{band.y} - header.data.y);
-        for (const Row& row : rows) {
+        for (std::size_t row = 0; row < rows; ++row) {
             append(beautyPositions, end);
-            disk.writeAt(end, row.beauty);
-            end += row.beauty.size();
+            disk.writeAt(end, chunks[row].beauty);
+            end += chunks[row].beauty.size();
             append(samplesPositions, end);
-            disk.writeAt(end, row.samples);
-            end += row.samples.size();
+            disk.writeAt(end, chunks[row].samples);
+            end += chunks[row].samples.size();
         }
+        const auto firstRow = static_cast<std::uint64_t>(std::int64_t{band.y} - header.data.y);
         disk.writeAt(beautyTable + 8 * firstRow, beautyPositions);
         disk.writeAt(samplesTable + 8 * firstRow, samplesPositions);
     }
 
-    Bytes beautyChunk(const SampleBand& band, int row) const {
+    void encodeBeauty(const SampleBand& band, int row, Scratch& scratch, Bytes& chunk) const {
         const auto width = static_cast<std::size_t>(band.width);
         const std::uint64_t* offsets = band.offsets.data() + static_cast<std::size_t>(row) * width;
         const int alpha = findChannel(header, "A");
-        Bytes data;
-        data.reserve(beauty.size() * width * sizeof(float));
+        Bytes& means = scratch.values;
+        means.clear();
         for (const int channel : beauty) {
             const auto& name = header.channels[static_cast<std::size_t>(channel)].name;
             const float* values = band.values[static_cast<std::size_t>(channel)].data();
             const float* hits = values;  // without A, hits are what has a distance
             if (alpha >= 0) hits = band.values[static_cast<std::size_t>(alpha)].data();
             for (std::size_t x = 0; x < width; ++x)
-                append(data, pixelMean(values, name == "Z" ? hits : nullptr, offsets[x], offsets[x + 1]));
+                append(means, pixelMean(values, name == "Z" ? hits : nullptr, offsets[x], offsets[x + 1]));
         }
-        const Bytes packed = pack(header.compression, std::move(data));
-        Bytes chunk;
-        chunk.reserve(packed.size() + 12);
+        const auto packed = scratch.packer.pack(means);
+        chunk.clear();
         append(chunk, std::uint32_t{0});
         append(chunk, static_cast<std::int32_t>(band.y + row));
         append(chunk, static_cast<std::uint32_t>(packed.size()));
         chunk.insert(chunk.end(), packed.begin(), packed.end());
-        return chunk;
     }
 
-    Bytes samplesChunk(const SampleBand& band, int row) const {
+    void encodeSamples(const SampleBand& band, int row, Scratch& scratch, Bytes& chunk) const {
         const auto width = static_cast<std::size_t>(band.width);
         const std::uint64_t* offsets = band.offsets.data() + static_cast<std::size_t>(row) * width;
-        Bytes counts;
-        counts.reserve(4 * width);
-        for (std::size_t x = 1; x <= width; ++x)
-            append(counts, static_cast<std::uint32_t>(offsets[x] - offsets[0]));
-        Bytes data;
-        data.reserve((offsets[width] - offsets[0]) * bytesPerSample);
-        for (std::size_t c = 0; c < order.size(); ++c) {
-            const float* values = band.values[static_cast<std::size_t>(order[c])].data();
-            appendValues(data, sorted.channels[c].type, values + offsets[0], offsets[width] - offsets[0]);
-        }
-        const std::size_t rawBytes = data.size();
-        counts = pack(header.compression, std::move(counts));
-        data = pack(header.compression, std::move(data));
-        Bytes chunk;
-        chunk.reserve(kPartNumber + kDeepChunkHead + counts.size() + data.size());
+        const std::uint64_t samples = offsets[width] - offsets[0];
+        chunk.clear();
         append(chunk, std::uint32_t{1});
         append(chunk, static_cast<std::int32_t>(band.y + row));
-        append(chunk, std::uint64_t{counts.size()});
-        append(chunk, std::uint64_t{data.size()});
-        append(chunk, std::uint64_t{rawBytes});
+        const std::size_t sizes = chunk.size();
+        chunk.resize(sizes + 3 * sizeof(std::uint64_t));
+
+        scratch.values.clear();
+        for (std::size_t x = 1; x <= width; ++x)
+            append(scratch.values, static_cast<std::uint32_t>(offsets[x] - offsets[0]));
+        const auto counts = scratch.packer.pack(scratch.values);
+        const std::uint64_t countsBytes = counts.size();
         chunk.insert(chunk.end(), counts.begin(), counts.end());
-        chunk.insert(chunk.end(), data.begin(), data.end());
-        return chunk;
+
+        scratch.values.clear();
+        for (std::size_t c = 0; c < order.size(); ++c)
+            appendValues(scratch.values, sorted.channels[c].type,
+                         band.values[static_cast<std::size_t>(order[c])].data() + offsets[0], samples);
+        const auto packed = scratch.packer.pack(scratch.values);
+        chunk.insert(chunk.end(), packed.begin(), packed.end());
+
+        const std::uint64_t head[] = {countsBytes, packed.size(), scratch.values.size()};
+        std::memcpy(chunk.data() + sizes, head, sizeof head);
     }
 
     const DumpHeader header;
@@ -333,7 +342,9 @@ struct DumpWriter::Impl {
     std::uint64_t samplesTable = 0;
     std::uint64_t end = 0;
     std::uint64_t maxSamples = 0;
+    std::vector<RowChunks> chunks;
     std::atomic<std::int64_t> cpu{0};
+    mutable Pool<Scratch> pool{[this] { return std::make_unique<Scratch>(header.compression); }};
 
     std::mutex mutex;  // guards the following
     std::condition_variable room, ready;
