@@ -237,8 +237,6 @@ MatrixXd KrigingSystem::driftRows(const MatrixXd& points, const MatrixXd& extern
     return rows;
 }
 
-double KrigingSystem::structureCovariance(double h) const { return covariance(model_, h); }
-
 void KrigingSystem::assemble(KrigingPrecision precision) {
     const Index n = places_.cols();
     CovarianceProblem problem;
@@ -267,7 +265,7 @@ void KrigingSystem::assemble(KrigingPrecision precision) {
             const double h = (places_.col(i) - places_.col(j)).norm();
             k(i, j) = report_.generalisedCovariance
                           ? level_ + centreGamma_[i] + centreGamma_[j] - semivariance(model_, h)
-                          : structureCovariance(h);
+                          : covariance(model_, h);
             if (positions_.col(i) == positions_.col(j)) k(i, j) += nugget_;
         }
     }
@@ -323,6 +321,7 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
     lower.exactDatum.assign(static_cast<std::size_t>(m), -1);
     const Index columns = driftRows(MatrixXd(0, dimension_), MatrixXd(0, q)).cols();
     lower.drift = MatrixXd::Zero(m, columns);
+    const VectorXd centre = place(origin_.transpose());
     for (Index t = 0; shapes && t < m; ++t) {
         const Block target = block(targets, t);
         if (!target.valid) continue;
@@ -342,22 +341,27 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
             continue;
         }
         const MatrixXd places = place(target.points);
-        double within = 0;  // mean semivariance or covariance inside the block
+        double within = 0;   // mean covariance, or semivariance, inside the block
+        double outward = 0;  // generalised: mean semivariance between centre and block
         for (Index a = 0; a < places.cols(); ++a) {
+            // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
+            const double g = generalised ? semivariance(model_, (places.col(a) - centre).norm()) : 0;
+            outward += target.weights[a] * g;
             for (Index i = 0; i < n; ++i) {
                 const double h = (places_.col(i) - places.col(a)).norm();
                 c0[i] +=
-                    target.weights[a] * (generalised ? -semivariance(model_, h) : structureCovariance(h));
+                    target.weights[a] * (generalised ? g - semivariance(model_, h) : covariance(model_, h));
             }
             for (Index b = 0; b < places.cols(); ++b) {
                 const double h = (places.col(a) - places.col(b)).norm();
                 within += target.weights[a] * target.weights[b] *
-                          (generalised ? semivariance(model_, h) : structureCovariance(h));
+                          (generalised ? semivariance(model_, h) : covariance(model_, h));
             }
         }
-        lower.variance[t] = generalised ? (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +
-                                              level_ * (2 * sum - sum * sum) - within
-                                        : within;
+        lower.variance[t] = within;
+        if (generalised)
+            lower.variance[t] = (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +
+                                level_ * (2 * sum - sum * sum) + 2 * sum * outward - within;
         if (!target.isPoint) continue;
         lower.variance[t] += nugget_;
         const VectorXd point = target.points.row(0).transpose();

@@ -209,7 +209,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     problem.values = data.means;
     problem.errorVariances = moments.errors;
 
-    const VariogramFit fit = fitStableModel(problem.positions, differences, moments.errors, data.pixels);
+    const VariogramFit fit = fitStableModel(data.positions, differences, moments.errors, data.pixels);
     if (!fit.ok() && fit.status != FitStatus::Zero) {
         useMean(estimate, data, moments, RegionOutcome::FitFailed);
         return estimate;

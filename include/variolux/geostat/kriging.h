@@ -134,7 +134,6 @@ class KrigingSystem {
     Eigen::MatrixXd place(const Eigen::MatrixXd& points) const;
     Eigen::MatrixXd driftRows(const Eigen::MatrixXd& points, const Eigen::MatrixXd& external) const;
     Eigen::Index constantColumn() const;
-    double structureCovariance(double h) const;
     DriftEstimate generalisedDrift() const;
     Block block(const KrigingTargets& targets, Eigen::Index target) const;
 

@@ -38,7 +38,8 @@ struct RegionEstimate {
 ///
 /// 1. Dissimilarity of two data (section 4): half the squared norm of their RGB difference, less the mean of
 ///    their error variances s^2/n: what noise adds is known and taken off, not fitted.
-/// 2. A stable model gamma(h) = c0 + c (1 - exp(-(h/r)^alpha)) is fitted to it in distance classes.
+/// 2. A stable model gamma(h) = c0 + c (1 - exp(-(h/r)^alpha)) is fitted to it in classes of
+///    distance on the image plane.
 /// 3. Composite distance (section 6): h^2 = dx^2 + dy^2 + k^2 |dz|^2 with dz the difference of two RGB
 /// estimates, each
 ///    taken from the region's arithmetic mean m. A datum's estimate is its mean; a target's is its pixel's
