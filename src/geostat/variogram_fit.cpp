@@ -199,11 +199,12 @@ VariogramFit fitVariogram(const EmpiricalVariogram& variogram, const FitOptions&
     fit.status = FitStatus::Ok;
     if (iterated && best.nugget + *std::max_element(best.sills.begin(), best.sills.end()) > 0) {
         fit.status = FitStatus::WeightsUnconverged;
-        for (int i = 0; i < 20 && fit.status != FitStatus::Ok; ++i) {
+        const bool fast = options.search == FitSearch::Fast;
+        for (int i = 0; i < (fast ? 3 : 20) && fit.status != FitStatus::Ok; ++i) {
             setWeights(classes, options, fit.model);
             best = search(problem, space, classes);
             const VariogramModel next = toModel(best, options, classes);
-            if (sameModel(fit.model, next, classes)) fit.status = FitStatus::Ok;
+            if ((fast && i == 2) || sameModel(fit.model, next, classes)) fit.status = FitStatus::Ok;
             fit.model = next;
         }
     }
