@@ -46,7 +46,8 @@ enum class FitSearch {
              ///< shape
     Fast,    ///< 24 ranges (8 shapes) and one refinement: for tens of thousands of regions, about 20
              ///< microseconds. With the default bounds and 12 classes the SSE is within 1 % of the global
-             ///< minimum in 95 % of noisy cases (asserted by the tests); no parameter standard errors
+           ///< minimum in 95 % of noisy cases (asserted by the tests); no parameter standard errors; iterated
+           ///< weights are updated three times
 };
 
 struct FitOptions {

@@ -1,0 +1,314 @@
+#include "separable_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "simplex.h"
+
+namespace vlx::separable {
+
+double Problem::sse(double nugget, const std::array<double, kMaxStructures>& sills) const {
+    const std::size_t k = classes_.size();
+    double sum = 0;
+    for (std::size_t b = 0; b < k; ++b) {
+        double r = classes_.g[b] - nugget;
+        for (std::size_t s = 0; s < options_.structures.size(); ++s) r -= sills[s] * columns_[s * k + b];
+        sum += classes_.w[b] * r * r;
+    }
+    return sum;
+}
+
+/// One structure: the unconstrained minimum if it is feasible, else the better edge of the quadrant.
+Solution Problem::solveOne() const {
+    double sw = 0, sg = 0, sc = 0, scc = 0, scg = 0;
+    for (std::size_t b = 0; b < classes_.size(); ++b) {
+        const double w = classes_.w[b], c = columns_[b], g = classes_.g[b];
+        sw += w;
+        sg += w * g;
+        sc += w * c;
+        scc += w * c * c;
+        scg += w * c * g;
+    }
+    Solution best;
+    const double meanColumn = sc / sw, meanValue = sg / sw;
+    if (options_.nugget) {
+        double spread = 0, slope = 0;
+        for (std::size_t b = 0; b < classes_.size(); ++b) {
+            const double d = columns_[b] - meanColumn;
+            spread += classes_.w[b] * d * d;
+            slope += classes_.w[b] * d * (classes_.g[b] - meanValue);
+        }
+        if (spread > 1e-20 * scc) {
+            best.sills[0] = slope / spread;
+            best.nugget = meanValue - best.sills[0] * meanColumn;
+            if (best.sills[0] >= 0 && best.nugget >= 0) {
+                best.sse = sse(best.nugget, best.sills);
+                return best;
+            }
+        }
+        best = {};
+        best.nugget = std::max(0.0, meanValue);
+        best.sse = sse(best.nugget, best.sills);
+    } else {
+        best.sse = sse(0, best.sills);
+    }
+    Solution edge;
+    edge.sills[0] = scc > 0 ? std::max(0.0, scg / scc) : 0;
+    edge.sse = sse(0, edge.sills);
+    return edge.sse < best.sse ? edge : best;
+}
+
+/// Several structures: non-negative least squares by trying every set of non-zero coefficients.
+Solution Problem::solveSubsets() const {
+    const int m = static_cast<int>(options_.structures.size());
+    const int unknowns = m + (options_.nugget ? 1 : 0);
+    const std::size_t k = classes_.size();
+    const auto column = [&](int u, std::size_t b) {
+        return u < m ? columns_[static_cast<std::size_t>(u) * k + b] : 1.0;
+    };
+    Eigen::Matrix<double, 4, 4> gram = Eigen::Matrix<double, 4, 4>::Zero();
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    for (std::size_t b = 0; b < k; ++b)
+        for (int i = 0; i < unknowns; ++i) {
+            right[i] += classes_.w[b] * column(i, b) * classes_.g[b];
+            for (int j = 0; j < unknowns; ++j) gram(i, j) += classes_.w[b] * column(i, b) * column(j, b);
+        }
+    Solution best;
+    best.sse = sse(0, best.sills);
+    for (int set = 1; set < 1 << unknowns; ++set) {
+        std::array<int, 4> index{};
+        int count = 0;
+        for (int u = 0; u < unknowns; ++u)
+            if (set >> u & 1) index[static_cast<std::size_t>(count++)] = u;
+        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4> a(count, count);
+        Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1> r(count);
+        for (int i = 0; i < count; ++i) {
+            r[i] = right[index[static_cast<std::size_t>(i)]];
+            for (int j = 0; j < count; ++j)
+                a(i, j) = gram(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(j)]);
+        }
+        const auto factor = a.ldlt();
+        const auto pivots = factor.vectorD();
+        if (!(pivots.minCoeff() > 1e-14 * pivots.maxCoeff())) continue;
+        const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1> x = factor.solve(r);
+        if (!(x.minCoeff() >= 0)) continue;
+        Solution candidate;
+        for (int i = 0; i < count; ++i) {
+            const int u = index[static_cast<std::size_t>(i)];
+            (u < m ? candidate.sills[static_cast<std::size_t>(u)] : candidate.nugget) = x[i];
+        }
+        candidate.sse = sse(candidate.nugget, candidate.sills);
+        if (candidate.sse < best.sse) best = candidate;
+    }
+    return best;
+}
+
+Space makeSpace(const FitOptions& options, const Classes& classes) {
+    Space space;
+    for (std::size_t s = 0; s < options.structures.size(); ++s) {
+        const FitStructure& structure = options.structures[s];
+        space.fixed[s] = {1, structure.minShape};
+        if (structure.type == StructureType::Linear) continue;
+        const double lower =
+            structure.minRange > 0 ? structure.minRange / classes.distanceScale : 1e-3 * classes.shortest;
+        const double upper = structure.maxRange > 0 ? structure.maxRange / classes.distanceScale : 20;
+        if (lower < upper)
+            space.variables.push_back({s, true, std::log(lower), std::log(upper)});
+        else
+            space.fixed[s].range = upper;
+        const bool shaped =
+            structure.type == StructureType::Stable || structure.type == StructureType::Matern;
+        if (shaped && structure.minShape < structure.maxShape)
+            space.variables.push_back({s, false, structure.minShape, structure.maxShape});
+    }
+    return space;
+}
+
+namespace {
+
+/// Points of a regular grid along one variable.
+std::vector<double> gridPoints(const Variable& v, int count) {
+    std::vector<double> points;
+    for (int i = 0; i < count; ++i) points.push_back(v.lower + (v.upper - v.lower) * i / (count - 1));
+    return points;
+}
+
+Solution better(const Solution& a, const Solution& b) { return b.sse < a.sse ? b : a; }
+
+/// Minimises over one variable of x in [lower, upper] by golden section.
+Solution golden(Problem& problem, const Space& space, std::vector<double> x, std::size_t v, double lower,
+                double upper, int steps) {
+    constexpr double ratio = 0.6180339887498949;
+    const auto value = [&](double t) {
+        x[v] = t;
+        return problem.solve(space.at(x));
+    };
+    double a = lower, b = upper;
+    double s = b - ratio * (b - a), t = a + ratio * (b - a);
+    Solution fs = value(s), ft = value(t);
+    for (int i = 0; i < steps; ++i) {
+        if (fs.sse <= ft.sse) {
+            b = t, t = s, ft = fs;
+            s = b - ratio * (b - a);
+            fs = value(s);
+        } else {
+            a = s, s = t, fs = ft;
+            t = a + ratio * (b - a);
+            ft = value(t);
+        }
+    }
+    return better(fs, ft);
+}
+
+}  // namespace
+
+std::vector<double> coordinates(const Space& space, const Solution& solution) {
+    std::vector<double> x;
+    for (const Variable& v : space.variables) {
+        const Shape& shape = solution.shapes[v.structure];
+        x.push_back(std::clamp(v.isRange ? std::log(shape.range) : shape.shape, v.lower, v.upper));
+    }
+    return x;
+}
+
+namespace {
+
+/// Every basin of one variable: a grid, then golden section around each local minimum and at both ends.
+Solution searchLine(Problem& problem, const Space& space, std::vector<double> x, std::size_t v, int count) {
+    const std::vector<double> points = gridPoints(space.variables[v], count);
+    std::vector<double> sse;
+    Solution best;
+    for (const double p : points) {
+        x[v] = p;
+        const Solution s = problem.solve(space.at(x));
+        sse.push_back(s.sse);
+        best = better(best, s);
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const bool left = i == 0 || sse[i] <= sse[i - 1],
+                   right = i + 1 == points.size() || sse[i] <= sse[i + 1];
+        // A basin that starts far above the best cannot hold the minimum.
+        if (!left || !right || sse[i] > 2 * best.sse + 1e-300) continue;
+        best = better(best, golden(problem, space, x, v, points[i == 0 ? 0 : i - 1],
+                                   points[std::min(i + 1, points.size() - 1)], 45));
+    }
+    return best;
+}
+
+/// All variables: the best grid points, each refined by the simplex; and every face where one shape is at a
+/// bound, which a simplex approaches badly.
+Solution searchGlobal(Problem& problem, const Space& space) {
+    const std::size_t dimensions = space.variables.size();
+    if (dimensions == 0) return problem.solve(space.fixed);
+    if (dimensions == 1) return searchLine(problem, space, {0}, 0, 160);
+
+    std::vector<std::vector<double>> axes;
+    for (const Variable& v : space.variables)
+        axes.push_back(gridPoints(v, v.isRange ? (dimensions == 2   ? 48
+                                                  : dimensions == 3 ? 24
+                                                                    : 14)
+                                               : (dimensions == 2 ? 14 : 6)));
+    std::vector<std::pair<Solution, std::vector<double>>> starts;
+    std::vector<std::size_t> index(dimensions, 0);
+    constexpr std::size_t keep = 8;
+    for (bool more = true; more;) {
+        std::vector<double> x;
+        for (std::size_t v = 0; v < dimensions; ++v) x.push_back(axes[v][index[v]]);
+        const Solution s = problem.solve(space.at(x));
+        if (starts.size() < keep || s.sse < starts.back().first.sse) {
+            const auto place =
+                std::upper_bound(starts.begin(), starts.end(), s,
+                                 [](const Solution& a, const auto& b) { return a.sse < b.first.sse; });
+            starts.insert(place, {s, x});
+            if (starts.size() > keep) starts.pop_back();
+        }
+        more = false;
+        for (std::size_t v = 0; v < dimensions && !more; ++v) {
+            more = ++index[v] < axes[v].size();
+            if (!more) index[v] = 0;
+        }
+    }
+
+    std::vector<double> lower, upper, steps;
+    for (std::size_t v = 0; v < dimensions; ++v) {
+        lower.push_back(space.variables[v].lower);
+        upper.push_back(space.variables[v].upper);
+        steps.push_back(axes[v][1] - axes[v][0]);
+    }
+    Solution best = starts.front().first;
+    const auto objective = [&](const std::vector<double>& x) {
+        const Solution s = problem.solve(space.at(x));
+        best = better(best, s);
+        return s.sse;
+    };
+    for (const auto& start : starts) minimizeSimplex(objective, start.second, steps, lower, upper);
+    for (std::size_t v = 0; v < dimensions; ++v) {
+        if (space.variables[v].isRange) continue;
+        for (const double bound : {lower[v], upper[v]}) {
+            std::vector<double> x = coordinates(space, best);
+            x[v] = bound;
+            for (std::size_t r = 0; r < dimensions; ++r)
+                if (space.variables[r].isRange) best = better(best, searchLine(problem, space, x, r, 60));
+        }
+    }
+    return best;
+}
+
+/// One structure of a class with a cheap grid: a geometric series of ranges, so that u^alpha is a product.
+Solution searchFast(Problem& problem, const Space& space, const Classes& classes) {
+    if (space.variables.empty()) return problem.solve(space.fixed);
+    constexpr int ranges = 24, shapes = 8;
+    Solution best;
+    std::vector<double> x(space.variables.size());
+    const bool freeShape = space.variables.size() == 2;
+    const std::vector<double> rangePoints = gridPoints(space.variables[0], ranges);
+    const std::vector<double> shapePoints =
+        freeShape ? gridPoints(space.variables[1], shapes) : std::vector<double>{space.fixed[0].shape};
+    const bool stable = problem.options().structures[0].type == StructureType::Stable;
+    std::vector<double> power(classes.size());
+    for (const double shape : shapePoints) {
+        if (freeShape) x[1] = shape;
+        const double ratio = std::exp(-shape * (rangePoints[1] - rangePoints[0]));
+        for (std::size_t b = 0; stable && b < classes.size(); ++b)
+            power[b] = std::pow(classes.h[b] / std::exp(rangePoints[0]), shape);
+        for (const double range : rangePoints) {
+            x[0] = range;
+            if (!stable) {
+                best = better(best, problem.solve(space.at(x)));
+                continue;
+            }
+            double* column = problem.column(0);
+            for (std::size_t b = 0; b < classes.size(); ++b) {
+                column[b] = -std::expm1(-power[b]);
+                power[b] *= ratio;
+            }
+            best = better(best, problem.solveColumns(space.at(x)));
+        }
+    }
+    const auto refine = [&](std::size_t v, double width, int steps) {
+        const Variable& variable = space.variables[v];
+        const std::vector<double> centre = coordinates(space, best);
+        best = better(best, golden(problem, space, centre, v, std::max(variable.lower, centre[v] - width),
+                                   std::min(variable.upper, centre[v] + width), steps));
+    };
+    const double rangeStep = rangePoints[1] - rangePoints[0];
+    refine(0, rangeStep, 8);
+    if (freeShape) {
+        refine(1, shapePoints[1] - shapePoints[0], 8);
+        refine(0, 0.5 * rangeStep, 8);
+    }
+    return best;
+}
+
+}  // namespace
+
+Solution search(Problem& problem, const Space& space, const Classes& classes) {
+    const bool fast = problem.options().search == FitSearch::Fast &&
+                      problem.options().structures.size() == 1 &&
+                      (space.variables.empty() || space.variables[0].isRange);
+    return fast ? searchFast(problem, space, classes) : searchGlobal(problem, space);
+}
+
+}  // namespace vlx::separable
