@@ -52,14 +52,11 @@ struct StackCommand {
             "  vlx-pack stack a.exr b.exr -o ab.exr --map R=diffuse.r --map G=diffuse.g --map B=diffuse.b");
         app.add_option("IMAGE", images, "Flat images of equal size")->required();
         app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
-        const std::map<std::string, vlx::StackPreset> presets = {{"auto", vlx::StackPreset::Auto},
-                                                                 {"cycles", vlx::StackPreset::Cycles},
-                                                                 {"plain", vlx::StackPreset::Plain}};
-        app.add_option("--preset", options.preset,
+        using enum vlx::StackPreset;
+        vlx::addChoice(app, "--preset", options.preset,
+                       {{"auto", Auto}, {"cycles", Cycles}, {"plain", Plain}},
                        "How channels are named. cycles: Blender's multilayer files with denoising data;\n"
-                       "plain: R, G, B and a dump's own names; auto: cycles when there is a Combined pass")
-            ->transform(CLI::CheckedTransformer(presets).description("{auto,cycles,plain}"))
-            ->default_str("auto");
+                       "plain: R, G, B and a dump's own names; auto: cycles when there is a Combined pass");
         app.add_option(
                "--map", mappings,
                "Take a dump's channel from an image's, for example R=Combined.R; goes before the preset")
@@ -67,14 +64,10 @@ struct StackCommand {
             ->expected(1)
             ->take_all();
         app.add_option("--renderer", options.renderer, "Name of the renderer, if the images do not tell");
-        const std::map<std::string, vlx::DumpCompression> compressions = {
-            {"none", vlx::DumpCompression::None},
-            {"rle", vlx::DumpCompression::Rle},
-            {"zips", vlx::DumpCompression::Zips}};
-        app.add_option("--compression", options.compression,
-                       "zips: small; rle: faster; none: fastest to read")
-            ->transform(CLI::CheckedTransformer(compressions).description("{none,rle,zips}"))
-            ->default_str("zips");
+        using enum vlx::DumpCompression;
+        vlx::addChoice(app, "--compression", options.compression,
+                       {{"none", None}, {"rle", Rle}, {"zips", Zips}},
+                       "Of the dump. zips: small; rle: faster to write; none: fastest to read");
     }
 
     int run() {
