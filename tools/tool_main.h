@@ -2,6 +2,9 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace vlx {
 
@@ -24,5 +27,25 @@ enum ExitCode : int {
 ///         return vlx::runTool(argc, argv, app, [&] { return run(options); });
 ///     }
 int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run);
+
+/// Binds an option whose value is one of a few names. Anything else is bad usage, with the names listed.
+template <class Enum>
+CLI::Option* addChoice(CLI::App& app, const std::string& flag, Enum& value,
+                       const std::vector<std::pair<std::string, Enum>>& names, const std::string& help) {
+    std::string all, current;
+    for (const auto& [name, meaning] : names) {
+        all += (all.empty() ? "" : "|") + name;
+        if (meaning == value) current = name;
+    }
+    const auto choose = [flag, &value, names, all](const std::string& text) {
+        for (const auto& [name, meaning] : names)
+            if (name == text) {
+                value = meaning;
+                return;
+            }
+        throw CLI::ValidationError(flag, "expected one of " + all + ", found '" + text + "'");
+    };
+    return app.add_option_function<std::string>(flag, choose, help)->type_name(all)->default_str(current);
+}
 
 }  // namespace vlx
