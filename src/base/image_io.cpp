@@ -1,9 +1,11 @@
 #include "variolux/base/image_io.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include "variolux/base/error.h"
@@ -65,15 +67,28 @@ void writeImage(const std::string& path, const Image& image, const ImageWriteOpt
     spec.full_width = image.display.width;
     spec.full_height = image.display.height;
     spec.channelnames = image.channels;
-    if (std::string_view(output->format_name()) == "openexr")
-        spec.attribute("compression", options.compression);
+    const bool exr = std::string_view(output->format_name()) == "openexr";
+    if (exr) spec.attribute("compression", options.compression);
     // Pixels arrive as they must be stored: no library-side colour conversion of 8-bit formats.
     spec.attribute("oiio:ColorSpace", spec.format == OIIO::TypeDesc::UINT8 ? "sRGB" : "Linear");
     for (const auto& [name, value] : options.attributes) spec.attribute(name, value);
 
+    // OpenEXR notices a full disk. The libraries behind other formats do not: libpng's output is cut short
+    // without a word, libjpeg ends the program. They write to memory, and the bytes are written here.
+    OIIO::Filesystem::IOVecOutput memory;
+    if (!exr && !output->set_ioproxy(&memory))
+        throw Error(path, std::string("expected an image format that can be written, found ") +
+                              output->format_name());
     if (!output->open(file.temporaryPath(), spec) ||
         !output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) || !output->close())
         throw Error(path, "writing failed: " + oiioError(output->geterror()));
+    if (!exr) {
+        std::ofstream bytes(file.temporaryPath(), std::ios::binary);
+        bytes.write(reinterpret_cast<const char*>(memory.buffer().data()),
+                    static_cast<std::streamsize>(memory.buffer().size()));
+        bytes.close();
+        if (!bytes) throw Error(path, "writing to disk failed");
+    }
     file.commit();
 }
 

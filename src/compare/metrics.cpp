@@ -127,18 +127,20 @@ bool hasLayer(const Image& image, std::string_view layer) {
            image.channel(prefix + "B") >= 0;
 }
 
+std::array<std::string, 3> colourChannels(const Image& image, const std::string& path,
+                                          const std::string& layer) {
+    if (!layer.empty() && hasLayer(image, layer)) return {layer + ".R", layer + ".G", layer + ".B"};
+    if (image.channel("R") >= 0 && image.channel("G") >= 0 && image.channel("B") >= 0) return {"R", "G", "B"};
+    if (image.channel("Y") >= 0) return {"Y", "Y", "Y"};
+    if (image.channelCount() == 1) return {image.channels[0], image.channels[0], image.channels[0]};
+    throw Error(path, "expected channels R, G, B" + (layer.empty() ? "" : " or " + layer + ".R, .G, .B") +
+                          " or a grey image, found " + listed(image.channels));
+}
+
 Image colourOf(const Image& image, const std::string& path, const std::string& layer) {
-    const std::string prefix = !layer.empty() && hasLayer(image, layer) ? layer + "." : "";
-    std::array<int, 3> from = {image.channel(prefix + "R"), image.channel(prefix + "G"),
-                               image.channel(prefix + "B")};
-    if (std::min({from[0], from[1], from[2]}) < 0) {
-        const int grey = image.channelCount() == 1 ? 0 : image.channel("Y");
-        if (grey < 0)
-            throw Error(path, "expected channels R, G, B" +
-                                  (layer.empty() ? "" : " or " + layer + ".R, .G, .B") +
-                                  " or a grey image, found " + listed(image.channels));
-        from = {grey, grey, grey};
-    }
+    const std::array<std::string, 3> names = colourChannels(image, path, layer);
+    const std::array<int, 3> from = {image.channel(names[0]), image.channel(names[1]),
+                                     image.channel(names[2])};
     Image colour(image.data, {"R", "G", "B"});
     colour.display = image.display;
     for (int row = 0; row < image.data.height; ++row)

@@ -1,7 +1,9 @@
 #include "variolux/base/image_io.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -35,6 +37,36 @@ TEST(ImageIo, PngStoresValuesAsTheyAre) {
     const std::vector<float> expected = {0.0f, 0.5f, 1.0f, 1.0f, 0.0f, 0.25f};
     for (std::size_t i = 0; i < expected.size(); ++i)
         EXPECT_NEAR(back.pixels[i], expected[i], 0.5f / 255 + 1e-6f);
+}
+
+TEST(ImageIo, OtherFormatsArriveWhole) {
+    const TemporaryFolder folder;
+    Image image(Window{0, 0, 40, 30}, {"R", "G", "B"});
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i % 200) / 255;
+    for (const std::string name : {"a.png", "a.tif", "a.hdr", "a.ppm", "a.bmp"}) {
+        writeImage(folder / name, image);
+        const Image back = readImage(folder / name);
+        ASSERT_EQ(back.data, image.data) << name;
+        for (std::size_t i = 0; i < image.pixels.size(); ++i)
+            ASSERT_NEAR(back.pixels[i], image.pixels[i], 0.02f) << name;
+    }
+}
+
+// A limit on the size of files stands for a full disk; libjpeg would have ended the program.
+TEST(ImageIo, FullDiskIsAnErrorInEveryFormat) {
+    const TemporaryFolder folder;
+    Image image(Window{0, 0, 200, 100}, {"R", "G", "B"});
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+        image.pixels[i] = static_cast<float>(i * 2654435761u % 1009) / 1009;
+    std::signal(SIGXFSZ, SIG_IGN);
+    rlimit before{};
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+    const rlimit limit{1000, before.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+    for (const std::string name : {"a.exr", "a.png", "a.jpg", "a.tif", "a.hdr", "a.ppm"})
+        EXPECT_THROW(writeImage(folder / name, image), Error) << name;
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    EXPECT_EQ(folder.entries(), 0);
 }
 
 TEST(ImageIo, BadFilesAreErrorsThatNameTheFile) {

@@ -58,10 +58,14 @@ struct Comparison {
     double operator[](Metric metric) const { return values[static_cast<std::size_t>(metric)]; }
 };
 
-/// The colour of an image as three channels R, G, B, found by name wherever they are: `layer`.R, .G, .B when
-/// a layer is given and the image has it, else R, G, B, else Y (grey: three equal channels), else the one
+/// The names of the channels that hold an image's red, green and blue: `layer`.R, .G, .B when a layer is
+/// given and the image has it, else R, G, B, else Y (grey: the same channel three times), else the one
 /// channel of a one-channel image. `path` names the image in errors. Throws Error, listing the channels there
 /// are, when there is no colour.
+std::array<std::string, 3> colourChannels(const Image& image, const std::string& path,
+                                          const std::string& layer = {});
+
+/// Those channels as an image of three, R, G, B, with the same windows. Same errors.
 Image colourOf(const Image& image, const std::string& path, const std::string& layer = {});
 
 /// Whether an image has the channels `layer`.R, .G and .B.

@@ -1,0 +1,234 @@
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tool_main.h"
+#include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
+#include "variolux/base/parallel.h"
+#include "variolux/compare/metrics.h"
+#include "variolux/compare/picture.h"
+#include "variolux/compare/report.h"
+
+namespace {
+
+using namespace vlx;
+
+constexpr const char* kStddev = "stddev";
+
+struct Options {
+    std::string reference;
+    std::vector<std::string> images;
+    std::string layer;
+    bool json = false;
+    std::vector<std::string> failAbove;
+    std::vector<std::string> failBelow;
+    bool stddev = false;
+    bool referenceStddev = false;
+    std::string pictures;
+    std::vector<std::string> crops;
+    double exposure = 0;
+    int threads = 0;
+};
+
+void bind(CLI::App& app, Options& options) {
+    app.add_option("REFERENCE", options.reference, "The image to measure against")->required();
+    app.add_option("IMAGE", options.images, "Images to measure; data windows must equal the reference's")
+        ->required();
+    app.add_option("--layer", options.layer,
+                   "Compare the channels NAME.R, NAME.G, NAME.B of every file that has them, and R, G, B of "
+                   "the others")
+        ->option_text("NAME");
+
+    const char* const output = "Output";
+    app.add_flag("--json", options.json, "Print JSON instead of the table")->group(output);
+    app.add_option("--pictures", options.pictures,
+                   "Write PNG pictures into this folder, made if need be: side_by_side, signed_error, "
+                   "relative_error and, with --crop, crops")
+        ->option_text("FOLDER")
+        ->group(output);
+    app.add_option("--crop", options.crops,
+                   "A part to outline and to show enlarged, in raster coordinates; repeatable")
+        ->option_text("X,Y,W,H")
+        ->take_all()
+        ->expected(1)
+        ->needs("--pictures")
+        ->group(output);
+    app.add_option("--exposure", options.exposure,
+                   "Stops by which pictures are brightened (-32 to 32); metrics are not affected")
+        ->check(CLI::Range(-32.0, 32.0))
+        ->option_text("EV")
+        ->needs("--pictures")
+        ->group(output);
+
+    const char* const checks = "Checks";
+    app.add_option("--fail-above", options.failAbove,
+                   "Exit with code 3 if an image's metric is above the value, or not a number; repeatable")
+        ->option_text("METRIC=VALUE")
+        ->take_all()
+        ->expected(1)
+        ->group(checks);
+    app.add_option("--fail-below", options.failBelow,
+                   "The same for metrics that are better when higher: psnr, ssim; repeatable")
+        ->option_text("METRIC=VALUE")
+        ->take_all()
+        ->expected(1)
+        ->group(checks);
+    app.add_flag("--stddev", options.stddev,
+                 "Check the error maps: the share of values of an image within 1 and 2 of its own standard "
+                 "deviations (stddev.R, stddev.G, stddev.B) of the reference")
+        ->group(checks);
+    app.add_flag("--reference-stddev", options.referenceStddev,
+                 "Add the variance of the reference's own stddev layer to the image's")
+        ->needs("--stddev")
+        ->group(checks);
+    app.add_option("--threads", options.threads,
+                   "Threads to use; 0: all processors. Results do not depend on it")
+        ->check(CLI::Range(0, 4096))
+        ->option_text("N");
+    app.footer(
+        R"(Metrics, for image x and reference r, over all pixels and R, G, B:
+  mse             mean (x - r)^2
+  rmse            its root
+  relmse          mean (x - r)^2 / (r^2 + 0.01)
+  relmse_trimmed  the same without the worst 0.1 % of pixels (rounded up)
+  mape            mean |x - r| / (|r| + 0.01)
+  rmse_tm         root of the mean (t(x) - t(r))^2, where t tone-maps:
+                  max(x, 0)^(1/2.2), at most 1
+  psnr            -20 log10(rmse_tm), in dB
+  ssim            structural similarity of t(x) and t(r) (Wang et al. 2004:
+                  Gaussian window 11 x 11, sigma 1.5), mean over R, G, B
+  bias            (mean x - mean r) / mean |r|; limits judge its magnitude
+  nonfinite       pixels of x with a NaN or infinite channel
+  negative        pixels of x with a channel below zero
+
+Pixels that are not finite in x or r are left out of all but the counts, and
+reported. Values are compared as stored: PNG and JPEG hold display values, not
+radiance. Of a sample dump, its flat beauty part is read.
+
+Exit codes: 0 done; 1 a file cannot be read, compared or written; 2 bad usage;
+3 a limit was passed.
+
+Examples:
+  vlx-compare reference.exr mean.exr kriged.exr
+  vlx-compare reference.exr kriged.exr --fail-above relmse=0.002 \
+      --fail-above nonfinite=0
+  vlx-compare reference.exr mean.exr kriged.exr --pictures out \
+      --crop 40,60,32,32 --exposure 1)");
+}
+
+/// What a library parser throws becomes bad usage of the option.
+template <typename Parse>
+auto parsed(const char* option, const Parse& parse) {
+    try {
+        return parse();
+    } catch (const Error& error) {
+        throw CLI::ValidationError(option, error.what());
+    }
+}
+
+struct Input {
+    std::string path;
+    std::array<std::string, 3> channels;
+    Image colour;
+    std::optional<Image> stddev;
+    bool layerFound;
+};
+
+Input readInput(const std::string& path, const Options& options, bool wantStddev) {
+    const Image image = readImage(path);
+    Input input{path,
+                colourChannels(image, path, options.layer),
+                colourOf(image, path, options.layer),
+                {},
+                hasLayer(image, options.layer)};
+    if (wantStddev && hasLayer(image, kStddev)) input.stddev = colourOf(image, path, kStddev);
+    return input;
+}
+
+void writePictures(const Options& options, const PictureOptions& picture, const Input& reference,
+                   const std::vector<Input>& inputs, const Report& report) {
+    std::vector<CaptionedImage> images;
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+        std::array<char, 48> note{};
+        std::snprintf(note.data(), note.size(), "relMSE %.3g", report.images[i].comparison[Metric::RelMse]);
+        images.push_back({report.images[i].name, note.data(), inputs[i].colour});
+    }
+    std::vector<CaptionedImage> all = images;
+    all.insert(all.begin(), CaptionedImage{"reference", "", reference.colour});
+
+    // All are drawn before the first is written: what fails here leaves nothing behind.
+    std::vector<std::pair<std::string, Image>> files;
+    files.emplace_back("side_by_side.png", sideBySide(all, picture));
+    if (!picture.crops.empty()) files.emplace_back("crops.png", enlargedCrops(all, picture));
+    files.emplace_back("signed_error.png", signedErrors(reference.colour, images, picture));
+    files.emplace_back("relative_error.png", relativeErrors(reference.colour, images));
+
+    const std::filesystem::path folder(options.pictures);
+    std::error_code status;
+    std::filesystem::create_directories(folder, status);
+    if (status) throw Error(options.pictures, "expected to make this folder: " + status.message());
+    for (const auto& [name, image] : files) writeImage((folder / name).string(), image);
+}
+
+int run(const Options& options) {
+    std::vector<Limit> limits;
+    for (const std::string& text : options.failAbove)
+        limits.push_back(parsed("--fail-above", [&] { return parseLimit(text, false); }));
+    for (const std::string& text : options.failBelow)
+        limits.push_back(parsed("--fail-below", [&] { return parseLimit(text, true); }));
+    PictureOptions picture;
+    picture.exposure = options.exposure;
+    for (const std::string& text : options.crops)
+        picture.crops.push_back(parsed("--crop", [&] { return parseCrop(text); }));
+    const ThreadLimit threads(options.threads);
+
+    const Input reference = readInput(options.reference, options, options.referenceStddev);
+    if (options.referenceStddev && !reference.stddev)
+        throw Error(options.reference, "expected channels stddev.R, stddev.G, stddev.B, found none");
+    bool layerFound = reference.layerFound;
+    bool stddevFound = false;
+    const std::vector<std::string> names = shortNames(options.images);
+    Report report{options.reference, reference.channels, reference.colour.data, {}, {}};
+    std::vector<Input> inputs;
+    for (std::size_t i = 0; i < options.images.size(); ++i) {
+        Input input = readInput(options.images[i], options, options.stddev);
+        ReportEntry entry{input.path,
+                          names[i],
+                          input.channels,
+                          compareColour(reference.colour, input.colour, input.path),
+                          {}};
+        if (input.stddev)
+            entry.calibration =
+                checkCalibration(reference.colour, input.colour, *input.stddev, reference.stddev, input.path);
+        report.images.push_back(std::move(entry));
+        layerFound = layerFound || input.layerFound;
+        stddevFound = stddevFound || input.stddev;
+        if (!options.pictures.empty()) inputs.push_back(std::move(input));
+    }
+    if (!options.layer.empty() && !layerFound)
+        throw Error(options.layer, "expected a layer of this name in at least one file, found none");
+    if (options.stddev && !stddevFound)
+        throw Error("--stddev", "expected an image with channels stddev.R, stddev.G, stddev.B, found none");
+    report.violations = checkLimits(report, limits);
+
+    if (!options.pictures.empty()) writePictures(options, picture, reference, inputs, report);
+    std::fputs((options.json ? toJson(report) : toText(report)).c_str(), stdout);
+    if (report.violations.empty()) return kDone;
+    for (const Violation& violation : report.violations)
+        std::fprintf(stderr, "vlx-compare: limit passed: %s\n", describe(violation).c_str());
+    return kPassed;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Measures images against a reference: error metrics, error maps, pictures side by side.",
+                 "vlx-compare");
+    Options options;
+    bind(app, options);
+    return runTool(argc, argv, app, [&] { return run(options); });
+}
