@@ -7,8 +7,8 @@
 #include "bands.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
+#include "variolux/geostat/covariance_system.h"
 #include "variolux/geostat/empirical_variogram.h"
-#include "variolux/geostat/kriging.h"
 #include "variolux/geostat/variogram_fit.h"
 
 namespace vlx {
@@ -75,25 +75,55 @@ Eigen::MatrixXd composite(const Eigen::MatrixXd& positions, const Eigen::MatrixX
     return joined;
 }
 
-/// Each pixel as a block of its cells' centres; every cell of a pixel has the pixel's colour.
-KrigingTargets pixelTargets(const RegionData& data, const Eigen::MatrixXd& colours, double k) {
+/// The kriging system and its targets: each pixel is the mean of its cells, at their centres, with the
+/// pixel's colour. The nugget is variation between cells, which a cell of the pixel shares with its datum.
+struct System {
+    CovarianceProblem problem;
+    CovarianceTargets targets;
+};
+
+System assemble(const RegionData& data, const VariogramModel& model, const Moments& moments,
+                const Eigen::MatrixXd& differences, const Eigen::MatrixXd& pixelColours, double k) {
+    const VariogramModel smooth{.nugget = 0, .structures = model.structures};
+    const Eigen::Index n = data.size();
+    const auto pixels = static_cast<Eigen::Index>(data.pixels.pixels());
     const int cells = data.cellsPerPixel, perPixel = cells * cells;
-    const Eigen::Index pixels = data.pixels.pixels();
-    Eigen::MatrixXd places(pixels * perPixel, 2), repeated(pixels * perPixel, kColours);
-    KrigingTargets targets;
-    Eigen::Index i = 0;
+
+    System system;
+    const Eigen::MatrixXd places = composite(data.positions, differences, k).transpose();
+    Eigen::MatrixXd& covariances = system.problem.covariance;
+    covariances.resize(n, n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+        for (Eigen::Index i = j + 1; i < n; ++i)
+            covariances(i, j) = covariance(smooth, (places.col(i) - places.col(j)).norm());
+        covariances(j, j) = model.sill() + moments.errors[j];
+    }
+    system.problem.drift = Eigen::MatrixXd::Ones(n, 1);
+    system.problem.values = data.means;
+
+    // Between two cells of one pixel only their distance matters: the same mean for every pixel.
+    double within = model.nugget / perPixel;
+    for (int a = 0; a < perPixel; ++a)
+        for (int b = 0; b < perPixel; ++b)
+            within += covariance(smooth, std::hypot(a % cells - b % cells, a / cells - b / cells) / cells) /
+                      (perPixel * perPixel);
+    system.targets.variance = Eigen::VectorXd::Constant(pixels, within);
+    system.targets.drift = Eigen::MatrixXd::Ones(pixels, 1);
+    system.targets.covariance = Eigen::MatrixXd::Zero(n, pixels);
     for (Eigen::Index p = 0; p < pixels; ++p) {
-        targets.begin.push_back(i);
-        for (int cell = 0; cell < perPixel; ++cell, ++i) {
-            places.row(i) << data.pixels.x + static_cast<double>(p % data.pixels.width) +
-                                 (cell % cells + 0.5) / cells,
-                data.pixels.y + static_cast<double>(p / data.pixels.width) + (cell / cells + 0.5) / cells;
-            repeated.row(i) = colours.row(p);
+        const double left = data.pixels.x + static_cast<double>(p % data.pixels.width);
+        const double top = data.pixels.y + static_cast<double>(p / data.pixels.width);
+        for (Eigen::Index i = 0; i < n; ++i) {
+            const double colour = k * (differences.row(i) - pixelColours.row(p)).norm();
+            const double x = data.positions(i, 0) - left, y = data.positions(i, 1) - top;
+            double sum = x > 0 && x < 1 && y > 0 && y < 1 ? model.nugget : 0;
+            for (int cell = 0; cell < perPixel; ++cell)
+                sum += covariance(smooth, std::hypot(x - (cell % cells + 0.5) / cells,
+                                                     y - (cell / cells + 0.5) / cells, colour));
+            system.targets.covariance(i, p) = sum / perPixel;
         }
     }
-    targets.begin.push_back(i);
-    targets.points = composite(places, repeated, k);
-    return targets;
+    return system;
 }
 
 /// Section 4: the empirical variogram of the cell means, less their noise, in classes up to the region's
@@ -204,36 +234,26 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     diagnostics.colourScale = k;
     const Eigen::MatrixXd differences = data.means.leftCols(kColours).rowwise() - moments.mean.head(kColours);
 
-    KrigingProblem problem;
-    problem.positions = composite(data.positions, differences, k);
-    problem.values = data.means;
-    problem.errorVariances = moments.errors;
-
     const VariogramFit fit = fitStableModel(data.positions, differences, moments.errors, data.pixels);
     if (!fit.ok() && fit.status != FitStatus::Zero) {
         useMean(estimate, data, moments, RegionOutcome::FitFailed);
         return estimate;
     }
-    diagnostics.nugget = fit.model.nugget;
-    if (fit.status == FitStatus::Zero || fit.model.structures.front().sill == 0) {
+    if (fit.status == FitStatus::Zero || fit.model.sill() == 0) {
         useMean(estimate, data, moments, RegionOutcome::NoStructure);
         return estimate;
     }
+    diagnostics.nugget = fit.model.nugget;
     diagnostics.sill = fit.model.structures.front().sill;
     diagnostics.range = fit.model.structures.front().range;
     diagnostics.exponent = fit.model.structures.front().shape;
-    problem.model = fit.model;
 
-    const KrigingSystem system(problem);
+    System assembled = assemble(data, fit.model, moments, differences, firstEstimates(data, moments), k);
+    const CovarianceSystem system(std::move(assembled.problem));
     diagnostics.condition = system.report().conditionEstimate;
     diagnostics.jitter = system.report().jitter;
-    if (!system.report().ok()) {
-        useMean(estimate, data, moments, RegionOutcome::SolveFailed);
-        return estimate;
-    }
-    const KrigingPrediction prediction =
-        system.predict(pixelTargets(data, firstEstimates(data, moments), k), {.weights = true});
-    if (!prediction.estimate.allFinite() || !prediction.variance.allFinite()) {
+    const KrigingPrediction prediction = system.predict(assembled.targets, {.weights = true});
+    if (!system.report().ok() || !prediction.estimate.allFinite() || !prediction.variance.allFinite()) {
         useMean(estimate, data, moments, RegionOutcome::SolveFailed);
         return estimate;
     }

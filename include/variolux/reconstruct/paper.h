@@ -49,6 +49,7 @@ struct RegionEstimate {
 ///    deviations away from all others, loses its weight.
 /// 4. The system (11), in covariance form (the errors with a plus on the diagonal of the covariances), is
 ///    factorised once; a pixel's estimate is the mean over its cells of the kriged field (a block target).
+///    The nugget is variation between cells that is no noise: a pixel contains that of its own cells.
 ///
 /// A region that cannot be kriged gets its mean; `diagnostics.outcome` says why. Never throws for numerical
 /// reasons; every value returned is finite.

@@ -14,7 +14,7 @@ namespace vlx {
 /// in the report and drawn in the diagnostic layer `diagnostics.outcome` (the number of the enumerator).
 enum class RegionOutcome {
     Kriged,       ///< a variogram was fitted and the system solved
-    NoStructure,  ///< the fitted partial sill is zero: kriging is then the weighted mean of the region's data
+    NoStructure,  ///< the fitted sill is zero: kriging is then the weighted mean of the region's data
     TooFewData,   ///< fewer than 3 data: their mean
     AllEqual,     ///< all data equal in every channel: that value, without error
     FitFailed,    ///< no variogram could be fitted: the mean
