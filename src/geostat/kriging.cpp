@@ -59,7 +59,7 @@ KrigingSystem::KrigingSystem(const KrigingProblem& problem) {
     chooseScales(problem);
     merge();
     assemble(problem.precision);
-    report();
+    completeReport();
 }
 
 bool KrigingSystem::validate(const KrigingProblem& problem) {
@@ -272,7 +272,7 @@ void KrigingSystem::assemble(KrigingPrecision precision) {
     system_ = CovarianceSystem(std::move(problem));
 }
 
-void KrigingSystem::report() {
+void KrigingSystem::completeReport() {
     KrigingReport system = system_.report();
     system.merged = report_.merged;
     system.ignored = report_.ignored;

@@ -130,7 +130,7 @@ class KrigingSystem {
     void chooseScales(const KrigingProblem& problem);
     void merge();
     void assemble(KrigingPrecision precision);
-    void report();
+    void completeReport();
     Eigen::MatrixXd place(const Eigen::MatrixXd& points) const;
     Eigen::MatrixXd driftRows(const Eigen::MatrixXd& points, const Eigen::MatrixXd& external) const;
     Eigen::Index constantColumn() const;
