@@ -12,13 +12,18 @@ constexpr std::size_t kColumns = 80;
 
 std::string wrapped(const std::string& text, std::size_t columns) {
     std::string result;
+    std::size_t used = 0;
+    bool newParagraph = false;
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
-        if (!result.empty()) result += '\n';
-        std::size_t used = 0;
         std::istringstream words(line);
-        for (std::string word; words >> word;) {
-            if (used > 0 && used + 1 + word.size() > columns) {
+        bool blank = true;
+        for (std::string word; words >> word; blank = false) {
+            if (newParagraph) {
+                result += "\n\n";
+                used = 0;
+                newParagraph = false;
+            } else if (used > 0 && used + 1 + word.size() > columns) {
                 result += '\n';
                 used = 0;
             } else if (used > 0) {
@@ -28,6 +33,7 @@ std::string wrapped(const std::string& text, std::size_t columns) {
             result += word;
             used += word.size();
         }
+        newParagraph = newParagraph || (blank && !result.empty());
     }
     return result;
 }

@@ -17,7 +17,8 @@ class HelpFormatter : public CLI::Formatter {
     std::string make_option_desc(const CLI::Option* option) const override;
 };
 
-/// Sets `text` in lines of at most `columns` characters, broken at spaces; line ends of the text stay.
+/// Sets `text` in lines of at most `columns` characters, broken at spaces. A blank line separates
+/// paragraphs; other line ends of the text count as spaces.
 std::string wrapped(const std::string& text, std::size_t columns);
 
 }  // namespace vlx
