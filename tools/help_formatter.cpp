@@ -47,6 +47,14 @@ std::string HelpFormatter::make_description(const CLI::App* app) const {
     return text.empty() ? text : wrapped(text, kColumns) + "\n\n";
 }
 
+std::string HelpFormatter::make_subcommand(const CLI::App* command) const {
+    std::ostringstream text;
+    CLI::detail::format_help(text, command->get_display_name(true),
+                             wrapped(command->get_description(), kColumns - get_column_width()),
+                             get_column_width());
+    return text.str();
+}
+
 std::string HelpFormatter::make_option_opts(const CLI::Option* option) const {
     if (!option->get_option_text().empty()) return " " + option->get_option_text();
     if (option->get_type_size() == 0 || option->get_positional()) return {};
