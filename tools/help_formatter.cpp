@@ -12,13 +12,18 @@ constexpr std::size_t kColumns = 80;
 
 std::string wrapped(const std::string& text, std::size_t columns) {
     std::string result;
+    std::size_t used = 0;
+    bool newParagraph = false;
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
-        if (!result.empty()) result += '\n';
-        std::size_t used = 0;
         std::istringstream words(line);
-        for (std::string word; words >> word;) {
-            if (used > 0 && used + 1 + word.size() > columns) {
+        bool blank = true;
+        for (std::string word; words >> word; blank = false) {
+            if (newParagraph) {
+                result += "\n\n";
+                used = 0;
+                newParagraph = false;
+            } else if (used > 0 && used + 1 + word.size() > columns) {
                 result += '\n';
                 used = 0;
             } else if (used > 0) {
@@ -28,6 +33,7 @@ std::string wrapped(const std::string& text, std::size_t columns) {
             result += word;
             used += word.size();
         }
+        newParagraph = newParagraph || (blank && !result.empty());
     }
     return result;
 }
@@ -39,6 +45,14 @@ std::string HelpFormatter::make_help(const CLI::App* app, std::string name, CLI:
 std::string HelpFormatter::make_description(const CLI::App* app) const {
     const std::string text = app->get_description();
     return text.empty() ? text : wrapped(text, kColumns) + "\n\n";
+}
+
+std::string HelpFormatter::make_subcommand(const CLI::App* command) const {
+    std::ostringstream text;
+    CLI::detail::format_help(text, command->get_display_name(true),
+                             wrapped(command->get_description(), kColumns - get_column_width()),
+                             get_column_width());
+    return text.str();
 }
 
 std::string HelpFormatter::make_option_opts(const CLI::Option* option) const {

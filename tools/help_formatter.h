@@ -13,11 +13,13 @@ class HelpFormatter : public CLI::Formatter {
 
     std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
     std::string make_description(const CLI::App* app) const override;
+    std::string make_subcommand(const CLI::App* command) const override;
     std::string make_option_opts(const CLI::Option* option) const override;
     std::string make_option_desc(const CLI::Option* option) const override;
 };
 
-/// Sets `text` in lines of at most `columns` characters, broken at spaces; line ends of the text stay.
+/// Sets `text` in lines of at most `columns` characters, broken at spaces. A blank line separates
+/// paragraphs; other line ends of the text count as spaces.
 std::string wrapped(const std::string& text, std::size_t columns);
 
 }  // namespace vlx

@@ -1,0 +1,70 @@
+#include <cmath>
+#include <cstdio>
+
+#include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
+#include "variolux/compare/gaussian.h"
+#include "variolux/compare/metrics.h"
+#include "variolux/dump/reader.h"
+#include "variolux/dump/writer.h"
+#include "variolux/geostat/variogram_model.h"
+
+namespace {
+
+int failures = 0;
+
+void expect(bool condition, const char* what) {
+    if (condition) return;
+    std::fprintf(stderr, "failed: %s\n", what);
+    ++failures;
+}
+
+void useImages() {
+    vlx::Image image(vlx::Window{0, 0, 16, 16}, {"R", "G", "B"});
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = i % 2 == 0 ? 0.25f : 0.75f;
+    vlx::writeImage("consumer.exr", image);
+    const vlx::Image back = vlx::readImage("consumer.exr");
+    const vlx::Comparison comparison = vlx::compareColour(image, vlx::gaussianFilter(back, 1.0).image);
+    expect(vlx::compareColour(image, back)[vlx::Metric::Mse] == 0, "an image reads back as it was written");
+    expect(comparison[vlx::Metric::Mse] > 0, "a filter changes an image");
+}
+
+void useDumps() {
+    vlx::DumpHeader header;
+    header.data = header.display = vlx::Window{0, 0, 2, 1};
+    header.channels = {{"R"}, {"G"}, {"B"}};
+    vlx::SampleBand band;
+    band.width = 2;
+    band.height = 1;
+    band.offsets = {0, 1, 3};
+    band.channels = {"R", "G", "B"};
+    band.values.assign(3, {0.5f, 1.0f, 2.0f});
+    vlx::DumpWriter writer("consumer_dump.exr", header);
+    writer.write(band);
+    writer.close();
+    expect(vlx::DumpReader("consumer_dump.exr").read(0, 1, {"G"}).values[0] == band.values[1],
+           "samples read back as they were written");
+}
+
+void useGeostatistics() {
+    vlx::VariogramModel model;
+    model.nugget = 0.25;
+    model.structures = {{vlx::StructureType::Exponential, 1.0, 2.0}};
+    expect(std::abs(vlx::semivariance(model, 2.0) - (1.25 - std::exp(-1.0))) < 1e-12,
+           "an exponential variogram at its range");
+}
+
+}  // namespace
+
+int main() {
+    try {
+        useImages();
+        useDumps();
+        useGeostatistics();
+    } catch (const vlx::Error& error) {
+        std::fprintf(stderr, "failed: %s\n", error.what());
+        return 1;
+    }
+    if (failures == 0) std::puts("consumer: all well");
+    return failures == 0 ? 0 : 1;
+}
