@@ -13,28 +13,33 @@ namespace vlx {
 /// "ViewLayer.Denoising Albedo.R"}. Values are taken as they are.
 using ChannelMap = std::map<std::string, std::string>;
 
+/// How channel names are understood.
+enum class StackPreset {
+    Auto,    ///< Cycles when a layer has a Combined pass, else Plain
+    Cycles,  ///< Blender's multilayer files: of the first layer L that has it, L.Combined -> R G B A,
+             ///< L.Denoising Albedo -> albedo, L.Denoising Normal -> N, L.Denoising Depth (or L.Depth) -> Z
+    Plain,   ///< R, G, B and the names of standardChannels(), as they are
+};
+
 struct StackOptions {
-    /// Explicit mapping (`--map R=Combined.R`). Entries override the preset's.
-    ChannelMap map;
-    /// "auto" (look at the channel names), "cycles" (Blender multilayer EXR: L.Combined, L.Denoising Albedo,
-    /// L.Denoising Normal, L.Denoising Depth or L.Depth, for the first layer L that has Combined), "plain"
-    /// (R, G, B and dump channel names as they are).
-    std::string preset = "auto";
-    std::string renderer;  ///< for the header; from the image's metadata when empty
+    StackPreset preset = StackPreset::Auto;
+    ChannelMap map;        ///< entries override the preset's (`--map R=Combined.R`)
+    std::string renderer;  ///< for the header; from the first image's metadata when empty
     DumpCompression compression = DumpCompression::Zips;
 };
 
 struct StackReport {
     ChannelMap mapped;                 ///< what was taken from where
     std::vector<std::string> ignored;  ///< image channels left out
-    std::vector<std::string>
-        notes;  ///< decisions worth telling (no positions: ..., infinite depth on misses: ...)
+    std::vector<std::string> notes;    ///< decisions worth telling, one sentence each
 };
 
-/// Joins images of the same view, rendered with different seeds, into a dump of one sample an image a pixel,
-/// in the order given. Streams: memory does not grow with the number of images times their size. Every image
-/// gets its own sample.replicate (different seeds are independent). Throws Error when images differ in
-/// windows or lack a mapped channel, naming the file and the channels it has.
+/// Joins flat images of the same view, rendered with different seeds, into a dump of one sample an image a
+/// pixel, in the order given. Every image gets its own sample.replicate, its number from 0: different seeds
+/// are independent. Z becomes 0 where it says that nothing was hit (not finite, negative, or 1e9 and more).
+/// There are no positions, unless the images have channels for them. Works by bands of rows: the memory is
+/// that of a few rows of all images. Throws Error when an image cannot be read, has other windows than the
+/// first, or lacks a mapped channel (naming the file and the channels it has), and as DumpWriter.
 StackReport stackImages(const std::vector<std::string>& images, const std::string& dump,
                         const StackOptions& options, const Progress& progress = {});
 

@@ -9,18 +9,18 @@
 
 namespace vlx {
 
-/// Writes a dump as a two-part OpenEXR file, streaming: a flat `beauty` part (per-pixel means of R, G, B, A
-/// and, when present, the mean Z of hits; FLOAT) that every viewer shows, and the deep scanline part
-/// `samples`. Compression and disk writes run on a thread of the writer's own (and OpenEXR's pool), never on
-/// the caller's; memory is a few bands, whatever the image's height. The file appears under its name only
-/// after close().
+/// Writes a dump as a two-part OpenEXR file, streaming: a flat `beauty` part that every viewer shows (FLOAT
+/// R, G, B, A: the means of a pixel's finite samples, and Z: that of its hits, A > 0), and the deep scanline
+/// part `samples`. Compression runs on parallelFor's threads, started by a thread of the writer's own, never
+/// on the caller's; memory is a few bands, whatever the image's height. The bytes written do not depend on
+/// the bands' heights or the number of threads. The file appears under its name only after close().
 ///
 /// Use: construct, write() bands of consecutive rows from the top to the bottom without gaps, close().
-/// Destroyed before close(), it leaves no file.
+/// Destroyed before close(), it leaves no file. Not for use from two threads at once.
 class DumpWriter {
   public:
-    /// Throws Error on an unusable header: empty or over-large windows (more than 2^31-1 pixels in a row or
-    /// rows), no channels, duplicate or invalid names, or when the file cannot be created.
+    /// Throws Error on an unusable header (empty windows or such beyond OpenEXR's coordinates, no R, G or B,
+    /// duplicate or invalid names, matrices not of 16 values) and when the file cannot be created.
     DumpWriter(const std::string& path, const DumpHeader& header);
     ~DumpWriter();
     DumpWriter(const DumpWriter&) = delete;
@@ -29,7 +29,7 @@ class DumpWriter {
     /// Queues the next rows; waits when too many bands are queued (bounded memory). The band must span the
     /// data window's columns, start at the row after the last one written, and hold the header's channels in
     /// its order. Throws Error on a band that does not, and on an earlier background write that failed (full
-    /// disk).
+    /// disk) or a row of more samples than OpenEXR can hold (2^31 bytes).
     void write(SampleBand band);
 
     /// Waits for all bands, records `renderSeconds` in the header when positive, and gives the file its name.

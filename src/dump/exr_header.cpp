@@ -1,0 +1,527 @@
+#include "exr_header.h"
+
+#include <ImfChannelList.h>
+#include <ImfCompressionAttribute.h>
+#include <ImfDeepImageState.h>
+#include <ImfDoubleAttribute.h>
+#include <ImfFloatAttribute.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfIntAttribute.h>
+#include <ImfMatrixAttribute.h>
+#include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+#include <ImfVersion.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <limits>
+#include <set>
+
+#include "little_endian.h"
+#include "variolux/base/error.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr char kVersion[] = "variolux:version";
+constexpr char kRenderer[] = "variolux:renderer";
+constexpr char kScene[] = "variolux:scene";
+constexpr char kSeed[] = "variolux:seed";
+constexpr char kSamples[] = "variolux:samples";
+constexpr char kPixelFilter[] = "variolux:pixelFilter";
+constexpr char kEffects[] = "variolux:effects";
+constexpr char kRenderSeconds[] = "variolux:renderSeconds";
+constexpr char kMaxSamples[] = "maxSamplesPerPixel";
+constexpr char kWorldToCamera[] = "worldToCamera";
+constexpr char kWorldToNDC[] = "worldToNDC";
+
+// Longest name that OpenEXR writes.
+constexpr std::size_t kMaxName = 255;
+
+class MemoryInput : public Imf::IStream {
+  public:
+    explicit MemoryInput(const Bytes& bytes) : Imf::IStream("header"), bytes_(bytes) {}
+    bool read(char to[], int count) override {
+        if (count < 0 || static_cast<std::size_t>(count) > bytes_.size() - at_)
+            throw std::runtime_error("it ends within an attribute");
+        if (count > 0) std::memcpy(to, bytes_.data() + at_, static_cast<std::size_t>(count));
+        at_ += static_cast<std::size_t>(count);
+        return at_ < bytes_.size();
+    }
+    std::uint64_t tellg() override { return at_; }
+    void seekg(std::uint64_t to) override { at_ = std::min<std::size_t>(to, bytes_.size()); }
+
+  private:
+    const Bytes& bytes_;
+    std::size_t at_ = 0;
+};
+
+class MemoryOutput : public Imf::OStream {
+  public:
+    explicit MemoryOutput(Bytes& bytes) : Imf::OStream("header"), bytes_(bytes) {}
+    void write(const char from[], int count) override {
+        const auto end = at_ + static_cast<std::size_t>(count);
+        if (end > bytes_.size()) bytes_.resize(end);
+        std::memcpy(bytes_.data() + at_, from, static_cast<std::size_t>(count));
+        at_ = end;
+    }
+    std::uint64_t tellp() override { return at_; }
+    void seekp(std::uint64_t to) override { at_ = to; }
+
+  private:
+    Bytes& bytes_;
+    std::size_t at_ = 0;
+};
+
+struct RawAttribute {
+    std::string name;
+    std::string type;
+    std::size_t begin = 0;  // of name, type, size and value
+    std::size_t value = 0;
+    std::size_t end = 0;
+};
+
+// Walks over the bytes of a header without trusting a size in them.
+class Walker {
+  public:
+    Walker(const std::string& path, const Bytes& bytes, std::uint64_t fileBytes)
+        : path_(path), bytes_(bytes), fileBytes_(fileBytes) {}
+
+    std::size_t position() const { return at_; }
+    bool ranOut() const { return ranOut_; }
+
+    std::uint32_t word() {
+        if (!has(4)) return 0;
+        at_ += 4;
+        return loadWord(bytes_.data() + at_ - 4);
+    }
+
+    // The attributes up to the empty name that ends a header; none when the list of headers ends here.
+    std::vector<RawAttribute> header() {
+        std::vector<RawAttribute> attributes;
+        while (!ranOut_) {
+            RawAttribute attribute;
+            attribute.begin = at_;
+            attribute.name = text();
+            if (ranOut_ || attribute.name.empty()) break;
+            attribute.type = text();
+            const std::uint32_t size = word();
+            if (ranOut_) break;
+            if (size > fileBytes_ - std::min<std::uint64_t>(fileBytes_, at_))
+                throw Error(path_, "attribute '" + attribute.name + "' claims " + std::to_string(size) +
+                                       " bytes, the whole file has " + std::to_string(fileBytes_));
+            attribute.value = at_;
+            if (!has(size)) break;
+            at_ += size;
+            attribute.end = at_;
+            attributes.push_back(std::move(attribute));
+        }
+        return attributes;
+    }
+
+  private:
+    bool has(std::size_t count) {
+        if (count <= bytes_.size() - at_) return true;
+        if (bytes_.size() == fileBytes_) throw Error(path_, "truncated: the file ends within its header");
+        ranOut_ = true;
+        return false;
+    }
+
+    std::string text() {
+        std::string name;
+        while (has(1)) {
+            const char c = static_cast<char>(bytes_[at_++]);
+            if (c == 0) break;
+            name += c;
+            if (name.size() > kMaxName) throw Error(path_, "damaged header: an endless attribute name");
+        }
+        return name;
+    }
+
+    const std::string& path_;
+    const Bytes& bytes_;
+    const std::uint64_t fileBytes_;
+    std::size_t at_ = 0;
+    bool ranOut_ = false;
+};
+
+const RawAttribute* find(const std::vector<RawAttribute>& attributes, std::string_view name) {
+    for (const auto& attribute : attributes)
+        if (attribute.name == name) return &attribute;
+    return nullptr;
+}
+
+std::string rawText(const Bytes& bytes, const RawAttribute* attribute) {
+    if (attribute == nullptr || attribute->type != "string") return {};
+    return {bytes.begin() + static_cast<std::ptrdiff_t>(attribute->value),
+            bytes.begin() + static_cast<std::ptrdiff_t>(attribute->end)};
+}
+
+std::optional<std::int32_t> rawInt(const Bytes& bytes, const RawAttribute* attribute) {
+    if (attribute == nullptr || attribute->type != "int" || attribute->end - attribute->value != 4)
+        return std::nullopt;
+    return static_cast<std::int32_t>(loadWord(bytes.data() + attribute->value));
+}
+
+// OpenEXR's own header, of the attributes whose readers trust no size within their value.
+Imf::Header parse(const std::string& path, const Bytes& bytes, const std::vector<RawAttribute>& attributes,
+                  int version) {
+    static const std::set<std::string> types = {"box2i",  "chlist", "compression", "lineOrder", "float",
+                                                "double", "int",    "string",      "m44f"};
+    Bytes known;
+    for (const auto& attribute : attributes)
+        if (types.contains(attribute.type))
+            known.insert(known.end(), bytes.begin() + static_cast<std::ptrdiff_t>(attribute.begin),
+                         bytes.begin() + static_cast<std::ptrdiff_t>(attribute.end));
+    known.push_back(0);
+    MemoryInput stream(known);
+    Imf::Header header;
+    try {
+        header.readFrom(stream, version);
+    } catch (const std::exception& error) {
+        throw Error(path, std::string("damaged header: ") + error.what());
+    }
+    if (stream.tellg() != known.size())
+        throw Error(path, "damaged header: an attribute is longer or shorter than it claims");
+    return header;
+}
+
+Window toWindow(const std::string& path, const char* what, const Imath::Box2i& box) {
+    const std::int64_t width = std::int64_t{box.max.x} - box.min.x + 1;
+    const std::int64_t height = std::int64_t{box.max.y} - box.min.y + 1;
+    constexpr std::int64_t most = std::numeric_limits<int>::max();
+    if (width < 1 || height < 1 || width > most || height > most)
+        throw Error(path, std::string("expected a ") + what + " of 1 to 2^31-1 columns and rows, found " +
+                              std::to_string(width) + " x " + std::to_string(height));
+    return {box.min.x, box.min.y, static_cast<int>(width), static_cast<int>(height)};
+}
+
+Imath::Box2i toBox(const Window& window) {
+    return {{window.x, window.y}, {window.x + (window.width - 1), window.y + (window.height - 1)}};
+}
+
+DumpCompression toCompression(const std::string& path, Imf::Compression compression) {
+    switch (compression) {
+        case Imf::NO_COMPRESSION:
+            return DumpCompression::None;
+        case Imf::RLE_COMPRESSION:
+            return DumpCompression::Rle;
+        case Imf::ZIPS_COMPRESSION:
+            return DumpCompression::Zips;
+        default:
+            throw Error(path,
+                        "expected compression none, RLE or ZIPS (deep files have no other), found type " +
+                            std::to_string(static_cast<int>(compression)));
+    }
+}
+
+Imf::Compression fromCompression(DumpCompression compression) {
+    switch (compression) {
+        case DumpCompression::None:
+            return Imf::NO_COMPRESSION;
+        case DumpCompression::Rle:
+            return Imf::RLE_COMPRESSION;
+        default:
+            return Imf::ZIPS_COMPRESSION;
+    }
+}
+
+Imf::PixelType fromType(ChannelType type) {
+    switch (type) {
+        case ChannelType::Half:
+            return Imf::HALF;
+        case ChannelType::Uint:
+            return Imf::UINT;
+        default:
+            return Imf::FLOAT;
+    }
+}
+
+std::vector<DumpChannel> toChannels(const std::string& path, const Imf::ChannelList& list) {
+    std::vector<DumpChannel> channels;
+    for (auto it = list.begin(); it != list.end(); ++it) {
+        const Imf::Channel& channel = it.channel();
+        const std::string name = it.name();
+        if (channel.xSampling != 1 || channel.ySampling != 1)
+            throw Error(path, "channel " + name + " is subsampled; deep files have no such channels");
+        DumpChannel& added = channels.emplace_back(DumpChannel{name, ChannelType::Float});
+        switch (channel.type) {
+            case Imf::HALF:
+                added.type = ChannelType::Half;
+                break;
+            case Imf::FLOAT:
+                break;
+            case Imf::UINT:
+                added.type = ChannelType::Uint;
+                break;
+            default:
+                throw Error(path, "channel " + name + " is of an unknown type");
+        }
+    }
+    return channels;
+}
+
+template <class T>
+std::optional<T> value(const Imf::Header& header, const std::string& name) {
+    if (const auto* found = header.findTypedAttribute<Imf::TypedAttribute<T>>(name)) return found->value();
+    return std::nullopt;
+}
+
+// Numbers of any attribute type: other programs choose other ones.
+std::optional<double> number(const Imf::Header& header, const std::string& name) {
+    if (const auto found = value<double>(header, name)) return *found;
+    if (const auto found = value<float>(header, name)) return *found;
+    if (const auto found = value<int>(header, name)) return *found;
+    return std::nullopt;
+}
+
+std::optional<std::vector<float>> matrix(const Imf::Header& header, const std::string& name) {
+    const auto found = value<Imath::M44f>(header, name);
+    if (!found) return std::nullopt;
+    return std::vector<float>(&found->x[0][0], &found->x[0][0] + 16);
+}
+
+std::vector<std::string> split(const std::string& text) {
+    std::vector<std::string> parts;
+    for (std::size_t begin = 0; begin < text.size();) {
+        const std::size_t end = std::min(text.find(',', begin), text.size());
+        if (end > begin) parts.push_back(text.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    return parts;
+}
+
+std::string joined(const std::vector<std::string>& parts) {
+    std::string text;
+    for (const auto& part : parts) text += (text.empty() ? "" : ",") + part;
+    return text;
+}
+
+// Attributes that a DumpHeader has members for, or that OpenEXR gives a meaning of its own.
+bool isReserved(const std::string& name) {
+    static const std::set<std::string> names = {"channels",
+                                                "chunkCount",
+                                                "compression",
+                                                "dataWindow",
+                                                "deepImageState",
+                                                "displayWindow",
+                                                "lineOrder",
+                                                kMaxSamples,
+                                                "name",
+                                                "pixelAspectRatio",
+                                                "screenWindowCenter",
+                                                "screenWindowWidth",
+                                                "tiles",
+                                                "type",
+                                                "version",
+                                                "view",
+                                                kWorldToCamera,
+                                                kWorldToNDC};
+    return name.starts_with("variolux:") || names.contains(name);
+}
+
+DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
+    DumpHeader dump;
+    dump.data = toWindow(path, "data window", header.dataWindow());
+    dump.display = toWindow(path, "display window", header.displayWindow());
+    dump.channels = toChannels(path, header.channels());
+    dump.compression = toCompression(path, header.compression());
+    dump.version = value<int>(header, kVersion).value_or(kDumpVersion);
+    // Renderers that know nothing of Variolux name themselves here.
+    dump.renderer = value<std::string>(header, kRenderer)
+                        .value_or(value<std::string>(header, "Software").value_or(std::string()));
+    dump.scene = value<std::string>(header, kScene).value_or(std::string());
+    dump.pixelFilter = value<std::string>(header, kPixelFilter).value_or(std::string());
+    dump.effects = split(value<std::string>(header, kEffects).value_or(std::string()));
+    if (const auto text = value<std::string>(header, kSeed)) {
+        std::int64_t seed = 0;
+        const auto [end, status] = std::from_chars(text->data(), text->data() + text->size(), seed);
+        if (status == std::errc() && end == text->data() + text->size()) dump.seed = seed;
+    }
+    dump.samples = number(header, kSamples);
+    dump.renderSeconds = number(header, kRenderSeconds);
+    if (dump.renderSeconds && !(*dump.renderSeconds > 0)) dump.renderSeconds.reset();  // 0: not recorded
+    dump.worldToCamera = matrix(header, kWorldToCamera);
+    dump.worldToNDC = matrix(header, kWorldToNDC);
+    for (auto it = header.begin(); it != header.end(); ++it) {
+        const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute());
+        if (text != nullptr && !isReserved(it.name())) dump.extra[it.name()] = text->value();
+    }
+    return dump;
+}
+
+// Every row takes a table entry, a chunk head, and its packed sample counts: a small file cannot hold a huge
+// image, whatever its header says.
+void checkClaims(const std::string& path, const FileHeader& header, std::uint64_t fileBytes) {
+    const Window& window = header.dump.data;
+    const auto rows = static_cast<std::uint64_t>(window.height);
+    const std::uint64_t counts = std::uint64_t{4} * static_cast<std::uint64_t>(window.width);
+    const std::uint64_t row = 8 + kDeepChunkHead + counts / maxRawBytes(header.dump.compression, 1);
+    if (header.chunkTable > fileBytes || row > (fileBytes - header.chunkTable) / rows)
+        throw Error(path, "truncated or damaged: the header claims " + windowText(window) +
+                              ", more than the file's " + std::to_string(fileBytes) + " bytes can hold");
+}
+
+}  // namespace
+
+std::string windowText(const Window& window) {
+    return std::to_string(window.width) + " x " + std::to_string(window.height) + " pixels at (" +
+           std::to_string(window.x) + ", " + std::to_string(window.y) + ")";
+}
+
+std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& start, std::uint64_t fileBytes) {
+    Walker walker(path, start, fileBytes);
+    if (fileBytes < 8 || walker.word() != static_cast<std::uint32_t>(Imf::MAGIC))
+        throw Error(path, "expected an OpenEXR file, found something else");
+    const int version = static_cast<int>(walker.word());
+    if (Imf::getVersion(version) != Imf::EXR_VERSION || !Imf::supportsFlags(Imf::getFlags(version)))
+        throw Error(path, "expected OpenEXR file version 2, found version field " + std::to_string(version));
+
+    FileHeader header;
+    header.multiPart = Imf::isMultiPart(version);
+    std::vector<std::vector<RawAttribute>> parts;
+    do {
+        auto attributes = walker.header();
+        if (walker.ranOut()) return std::nullopt;
+        if (attributes.empty() && header.multiPart) break;
+        parts.push_back(std::move(attributes));
+    } while (header.multiPart);
+
+    bool deepTiles = false;
+    std::size_t part = 0;
+    for (; part < parts.size(); ++part) {
+        const std::string type = rawText(start, find(parts[part], "type"));
+        if (type == "deepscanline") break;
+        deepTiles = deepTiles || type == "deeptile";
+    }
+    if (part == parts.size())
+        throw Error(path, deepTiles
+                              ? "expected deep scanlines, found deep tiles, which Variolux does not read"
+                              : "expected deep samples, found only flat pixels (vlx-pack stack makes a "
+                                "dump of images of different seeds)");
+    for (const char* required : {"channels", "compression", "dataWindow"})
+        if (find(parts[part], required) == nullptr)
+            throw Error(path, std::string("damaged header: attribute '") + required + "' is missing");
+
+    const Imf::Header parsed = parse(path, start, parts[part], version);
+    header.dump = toDumpHeader(path, parsed);
+    if (find(parts[part], "displayWindow") == nullptr) header.dump.display = header.dump.data;
+    header.part = static_cast<int>(part);
+
+    // The tables of the parts follow the headers, in the order of the parts.
+    header.chunkTable = walker.position();
+    for (std::size_t i = 0; i <= part; ++i) {
+        const auto chunks = rawInt(start, find(parts[i], "chunkCount"));
+        if (i == part) {
+            if (chunks.value_or(header.dump.data.height) != header.dump.data.height)
+                throw Error(path, "expected a chunk for each of " + std::to_string(header.dump.data.height) +
+                                      " rows, found chunkCount " + std::to_string(*chunks));
+            break;
+        }
+        if (!chunks || *chunks < 0)
+            throw Error(path, "damaged header: part " + std::to_string(i) + " lacks a valid chunkCount");
+        header.chunkTable += std::uint64_t{8} * static_cast<std::uint64_t>(*chunks);
+    }
+    checkClaims(path, header, fileBytes);
+
+    for (const char* name : {"R", "G", "B"})
+        if (findChannel(header.dump, name) < 0) {
+            std::string found;
+            for (const auto& channel : header.dump.channels) found += " " + channel.name;
+            throw Error(path, "expected channels R, G and B, found" + found);
+        }
+    for (const auto& channel : header.dump.channels) header.bytesPerSample += valueBytes(channel.type);
+    return header;
+}
+
+std::vector<std::string> beautyChannels(const DumpHeader& dump) {
+    std::vector<std::string> names;
+    for (const char* name : {"A", "B", "G", "R", "Z"})
+        if (findChannel(dump, name) >= 0) names.emplace_back(name);
+    return names;
+}
+
+EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
+    EncodedHeader encoded;
+    try {
+        Imf::Header common(toBox(dump.display), toBox(dump.data));
+        common.compression() = fromCompression(dump.compression);
+        common.lineOrder() = Imf::INCREASING_Y;
+        common.setChunkCount(dump.data.height);
+        if (dump.worldToCamera) {
+            Imath::M44f m;
+            std::copy_n(dump.worldToCamera->begin(), 16, &m.x[0][0]);
+            Imf::addWorldToCamera(common, m);
+        }
+        if (dump.worldToNDC) {
+            Imath::M44f m;
+            std::copy_n(dump.worldToNDC->begin(), 16, &m.x[0][0]);
+            Imf::addWorldToNDC(common, m);
+        }
+        for (const auto& [name, text] : dump.extra) {
+            if (isReserved(name))
+                throw Error(path, "attribute '" + name + "' may not be set as an extra one");
+            common.insert(name, Imf::StringAttribute(text));
+        }
+
+        Imf::Header beauty = common;
+        beauty.setName("beauty");
+        beauty.setType(Imf::SCANLINEIMAGE);
+        for (const auto& name : beautyChannels(dump))
+            beauty.channels().insert(name, Imf::Channel(Imf::FLOAT));
+
+        Imf::Header samples = common;
+        samples.setName("samples");
+        samples.setType(Imf::DEEPSCANLINE);
+        samples.setVersion(1);
+        for (const auto& channel : dump.channels)
+            samples.channels().insert(channel.name, Imf::Channel(fromType(channel.type)));
+        Imf::addDeepImageState(samples, Imf::DIS_MESSY);
+        samples.insert(kMaxSamples, Imf::IntAttribute(0));
+        samples.insert(kVersion, Imf::IntAttribute(dump.version));
+        const auto text = [&](const char* name, const std::string& content) {
+            if (!content.empty()) samples.insert(name, Imf::StringAttribute(content));
+        };
+        text(kRenderer, dump.renderer);
+        text(kScene, dump.scene);
+        text(kPixelFilter, dump.pixelFilter);
+        text(kEffects, joined(dump.effects));
+        if (dump.seed) text(kSeed, std::to_string(*dump.seed));
+        if (dump.samples) samples.insert(kSamples, Imf::DoubleAttribute(*dump.samples));
+        samples.insert(kRenderSeconds, Imf::DoubleAttribute(dump.renderSeconds.value_or(0)));
+
+        MemoryOutput out(encoded.bytes);
+        // The flags say: deep data, several parts, and names of up to 255 bytes.
+        const std::array<std::uint32_t, 2> start = {
+            static_cast<std::uint32_t>(Imf::MAGIC),
+            static_cast<std::uint32_t>(Imf::EXR_VERSION | Imf::NON_IMAGE_FLAG | Imf::MULTI_PART_FILE_FLAG |
+                                       Imf::LONG_NAMES_FLAG)};
+        for (const std::uint32_t word : start) append(encoded.bytes, word);
+        out.seekp(encoded.bytes.size());
+        for (Imf::Header* part : {&beauty, &samples}) {
+            part->sanityCheck(false, true);
+            part->writeTo(out);
+        }
+        encoded.bytes.push_back(0);
+    } catch (const Error&) {
+        throw;
+    } catch (const std::exception& error) {
+        throw Error(path, std::string("this header cannot be written: ") + error.what());
+    }
+
+    Walker walker(path, encoded.bytes, encoded.bytes.size());
+    walker.word();
+    walker.word();
+    walker.header();
+    const auto samples = walker.header();
+    encoded.renderSeconds = find(samples, kRenderSeconds)->value;
+    encoded.maxSamplesPerPixel = find(samples, kMaxSamples)->value;
+    return encoded;
+}
+
+}  // namespace vlx

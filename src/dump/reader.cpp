@@ -1,0 +1,250 @@
+#include "variolux/dump/reader.h"
+
+#include <Imath/half.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+
+#include "exr_header.h"
+#include "little_endian.h"
+#include "pool.h"
+#include "raw_file.h"
+#include "variolux/base/error.h"
+#include "variolux/base/parallel.h"
+
+// Why not OpenEXR's own reading classes: DeepScanLineInputPart allocates tables for the whole image before
+// anything is checked, and the unpacking of deep chunks in the C core of 3.1 trusts their sizes. Attributes
+// do go through OpenEXR.
+
+namespace vlx {
+
+namespace {
+
+constexpr std::size_t kFirstRead = 64 << 10;
+constexpr std::size_t kMaxHeader = 64 << 20;
+constexpr std::uint64_t kMaxInt = std::numeric_limits<std::int32_t>::max();
+
+// A chunk whose head has been checked against the file.
+struct Chunk {
+    int y = 0;
+    std::uint64_t counts = 0;  // position of the packed sample counts; the packed samples follow
+    std::uint64_t countsBytes = 0;
+    std::uint64_t packedBytes = 0;
+    std::uint64_t rawBytes = 0;
+    std::vector<std::uint32_t> ends;  // running sum of the pixels' sample counts
+    std::uint64_t samples() const { return ends.back(); }
+};
+
+// Memory of a task.
+struct Scratch {
+    explicit Scratch(DumpCompression compression) : unpacker(compression) {}
+    Unpacker unpacker;
+    Bytes packed;
+};
+
+// A channel as read() gives it, and where its values are among those of a row.
+struct Source {
+    ChannelType type = ChannelType::Float;
+    std::uint64_t bytesBefore = 0;  // of the channels before it, a sample
+};
+
+void widen(const unsigned char* bytes, ChannelType type, std::uint64_t count, float* to) {
+    if (type == ChannelType::Float) {
+        if (count > 0) std::memcpy(to, bytes, count * sizeof(float));
+    } else if (type == ChannelType::Half) {
+        for (std::uint64_t i = 0; i < count; ++i)
+            to[i] = imath_half_to_float(static_cast<std::uint16_t>(bytes[2 * i] | bytes[2 * i + 1] << 8));
+    } else {
+        for (std::uint64_t i = 0; i < count; ++i) to[i] = static_cast<float>(loadWord(bytes + 4 * i));
+    }
+}
+
+}  // namespace
+
+struct DumpReader::Impl {
+    explicit Impl(const std::string& path)
+        : file(path, path, RawFile::Mode::Read), fileBytes(file.size()), header(readHeader()) {}
+
+    FileHeader readHeader() const {
+        for (std::uint64_t size = kFirstRead;; size *= 2) {
+            Bytes start(std::min(size, fileBytes));
+            file.readAt(0, start);
+            if (auto decoded = decodeHeader(file.name(), start, fileBytes)) return *decoded;
+            if (size >= kMaxHeader) throw Error(file.name(), "damaged header: it does not end");
+        }
+    }
+
+    [[noreturn]] void damaged(int y, const std::string& reason) const {
+        throw Error(file.name(), "scanline " + std::to_string(y) + " (chunk " +
+                                     std::to_string(std::int64_t{y} - header.dump.data.y) + "): " + reason);
+    }
+
+    void checkRows(int y, int rows) const {
+        const Window& window = header.dump.data;
+        if (rows < 1 || y < window.y || std::int64_t{y} + rows > std::int64_t{window.y} + window.height)
+            throw Error(file.name(), "expected rows within " + windowText(window) + ", found rows " +
+                                         std::to_string(y) + " to " +
+                                         std::to_string(std::int64_t{y} + rows - 1));
+    }
+
+    std::span<const unsigned char> read(std::uint64_t position, std::uint64_t count, Scratch& scratch) const {
+        if (scratch.packed.size() < count) scratch.packed.resize(count);
+        const std::span<unsigned char> bytes(scratch.packed.data(), count);
+        file.readAt(position, bytes);
+        return bytes;
+    }
+
+    // The head and the sample counts of the chunk of row y.
+    Chunk readCounts(int y, std::uint64_t position) const {
+        if (position == 0) damaged(y, "missing: the file was not finished");
+        const std::uint64_t head = kDeepChunkHead + (header.multiPart ? kPartNumber : 0);
+        if (position > fileBytes || head > fileBytes - position)
+            damaged(y, "truncated: it should start at byte " + std::to_string(position) + ", the file has " +
+                           std::to_string(fileBytes));
+        std::array<unsigned char, kDeepChunkHead + kPartNumber> bytes{};
+        file.readAt(position, {bytes.data(), head});
+        const unsigned char* at = bytes.data();
+        if (header.multiPart) {
+            if (static_cast<std::int32_t>(loadWord(at)) != header.part)
+                damaged(y, "damaged: expected a chunk of part " + std::to_string(header.part) +
+                               ", found part " + std::to_string(static_cast<std::int32_t>(loadWord(at))));
+            at += kPartNumber;
+        }
+        Chunk chunk;
+        chunk.y = y;
+        if (static_cast<std::int32_t>(loadWord(at)) != y)
+            damaged(y, "damaged: found the chunk of scanline " +
+                           std::to_string(static_cast<std::int32_t>(loadWord(at))));
+        chunk.counts = position + head;
+        chunk.countsBytes = loadLong(at + 4);
+        chunk.packedBytes = loadLong(at + 12);
+        chunk.rawBytes = loadLong(at + 20);
+        const std::uint64_t left = fileBytes - chunk.counts;
+        if (chunk.countsBytes > left || chunk.packedBytes > left - chunk.countsBytes)
+            damaged(y, "truncated or damaged: it claims " + std::to_string(chunk.countsBytes) + " + " +
+                           std::to_string(chunk.packedBytes) + " bytes, the file has " +
+                           std::to_string(left) + " left");
+        const DumpCompression compression = header.dump.compression;
+        const auto width = static_cast<std::uint64_t>(header.dump.data.width);
+        if (4 * width > kMaxInt || 4 * width > maxRawBytes(compression, chunk.countsBytes))
+            damaged(y, "damaged: " + std::to_string(chunk.countsBytes) + " bytes cannot hold the counts of " +
+                           std::to_string(width) + " pixels");
+        if (chunk.rawBytes > kMaxInt || chunk.rawBytes > maxRawBytes(compression, chunk.packedBytes))
+            damaged(y, "damaged: " + std::to_string(chunk.packedBytes) + " bytes cannot unpack to " +
+                           std::to_string(chunk.rawBytes));
+
+        const auto scratch = pool.borrow();
+        const auto unpacked =
+            scratch->unpacker.unpack(read(chunk.counts, chunk.countsBytes, *scratch), 4 * width);
+        if (!unpacked) damaged(y, "damaged: its sample counts do not unpack");
+        chunk.ends.resize(width);
+        std::uint32_t last = 0;
+        for (std::size_t x = 0; x < width; ++x) {
+            const std::uint32_t value = loadWord(unpacked->data() + 4 * x);
+            if (value < last || value > kMaxInt)
+                damaged(y, "damaged: its sample counts decrease at column " +
+                               std::to_string(header.dump.data.x + static_cast<std::int64_t>(x)));
+            chunk.ends[x] = last = value;
+        }
+        if (chunk.samples() * header.bytesPerSample != chunk.rawBytes)
+            damaged(y, "damaged: " + std::to_string(chunk.samples()) + " samples take " +
+                           std::to_string(chunk.samples() * header.bytesPerSample) + " bytes, it claims " +
+                           std::to_string(chunk.rawBytes));
+        return chunk;
+    }
+
+    std::vector<Chunk> readCounts(int y, int rows) const {
+        checkRows(y, rows);
+        const auto first = static_cast<std::uint64_t>(std::int64_t{y} - header.dump.data.y);
+        Bytes table(8 * static_cast<std::size_t>(rows));
+        file.readAt(header.chunkTable + 8 * first, table);
+        std::vector<Chunk> chunks(static_cast<std::size_t>(rows));
+        parallelFor(0, rows, [&](std::int64_t row) {
+            chunks[static_cast<std::size_t>(row)] =
+                readCounts(y + static_cast<int>(row), loadLong(table.data() + 8 * row));
+        });
+        // Chunks that overlap could claim more memory together than the file is worth.
+        std::uint64_t packed = 0;
+        for (const Chunk& chunk : chunks) packed += chunk.countsBytes + chunk.packedBytes;
+        if (packed > fileBytes)
+            damaged(y, "damaged: the chunks of this and the next rows overlap in the file");
+        return chunks;
+    }
+
+    const RawFile file;
+    const std::uint64_t fileBytes;
+    const FileHeader header;
+    mutable Pool<Scratch> pool{[this] { return std::make_unique<Scratch>(header.dump.compression); }};
+};
+
+DumpReader::DumpReader(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
+DumpReader::~DumpReader() = default;
+DumpReader::DumpReader(DumpReader&&) noexcept = default;
+DumpReader& DumpReader::operator=(DumpReader&&) noexcept = default;
+
+const std::string& DumpReader::path() const { return impl_->file.name(); }
+const DumpHeader& DumpReader::header() const { return impl_->header.dump; }
+std::uint64_t DumpReader::fileBytes() const { return impl_->fileBytes; }
+
+SampleBand DumpReader::read(int y, int rows, const std::vector<std::string>& channels) const {
+    const DumpHeader& dump = impl_->header.dump;
+    SampleBand band;
+    band.x = dump.data.x;
+    band.y = y;
+    band.width = dump.data.width;
+    band.height = rows;
+    band.channels = channels;
+    if (channels.empty())
+        for (const auto& channel : dump.channels) band.channels.push_back(channel.name);
+    std::vector<Source> sources;
+    for (const auto& name : band.channels) {
+        const int found = findChannel(dump, name);
+        if (found < 0)
+            throw Error(impl_->file.name(), "expected a channel " + name + ", found none of this name");
+        Source& source = sources.emplace_back(Source{dump.channels[static_cast<std::size_t>(found)].type, 0});
+        for (int i = 0; i < found; ++i)
+            source.bytesBefore += valueBytes(dump.channels[static_cast<std::size_t>(i)].type);
+    }
+
+    const std::vector<Chunk> chunks = impl_->readCounts(y, rows);
+    band.offsets.resize(band.pixels() + 1);
+    std::vector<std::uint64_t> starts;
+    std::uint64_t total = 0;
+    std::size_t pixel = 1;
+    for (const Chunk& chunk : chunks) {
+        starts.push_back(total);
+        for (const std::uint32_t end : chunk.ends) band.offsets[pixel++] = total + end;
+        total += chunk.samples();
+    }
+    band.values.resize(band.channels.size());
+    for (auto& values : band.values) values.resize(total);
+    parallelFor(0, rows, [&](std::int64_t row) {
+        const Chunk& chunk = chunks[static_cast<std::size_t>(row)];
+        const auto scratch = impl_->pool.borrow();
+        const auto raw = scratch->unpacker.unpack(
+            impl_->read(chunk.counts + chunk.countsBytes, chunk.packedBytes, *scratch), chunk.rawBytes);
+        if (!raw) impl_->damaged(chunk.y, "damaged: its samples do not unpack");
+        for (std::size_t c = 0; c < sources.size(); ++c)
+            widen(raw->data() + sources[c].bytesBefore * chunk.samples(), sources[c].type, chunk.samples(),
+                  band.values[c].data() + starts[static_cast<std::size_t>(row)]);
+    });
+    return band;
+}
+
+std::vector<std::uint32_t> DumpReader::counts(int y, int rows) const {
+    std::vector<std::uint32_t> counts;
+    counts.reserve(static_cast<std::size_t>(impl_->header.dump.data.width) *
+                   static_cast<std::size_t>(rows > 0 ? rows : 0));
+    for (const Chunk& chunk : impl_->readCounts(y, rows)) {
+        std::uint32_t last = 0;
+        for (const std::uint32_t end : chunk.ends) {
+            counts.push_back(end - last);
+            last = end;
+        }
+    }
+    return counts;
+}
+
+}  // namespace vlx

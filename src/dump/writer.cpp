@@ -1,0 +1,371 @@
+#include "variolux/dump/writer.h"
+
+#include <Imath/half.h>
+#include <time.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <limits>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "exr_header.h"
+#include "little_endian.h"
+#include "pool.h"
+#include "raw_file.h"
+#include "variolux/base/error.h"
+#include "variolux/base/output_file.h"
+#include "variolux/base/parallel.h"
+
+// Why not OpenEXR's own writing classes: MultiPartOutputFile takes a table of pointers to every pixel, shares
+// one global thread pool whose processor time cannot be told, and compresses with a zlib strategy that costs
+// more than twice as much; the C core writes one part after the other, so that the flat part could not be
+// streamed beside the samples. Header bytes do come from OpenEXR.
+
+namespace vlx {
+
+namespace {
+
+// Bands that wait for compression; one more is being compressed.
+constexpr std::size_t kQueuedBands = 2;
+
+constexpr std::int64_t kMaxInt = std::numeric_limits<std::int32_t>::max();
+
+std::int64_t threadNanoseconds() {
+    timespec now{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+// Adds the processor time of its own life to a sum.
+class CpuTimer {
+  public:
+    explicit CpuTimer(std::atomic<std::int64_t>& sum) : sum_(sum) {}
+    ~CpuTimer() { sum_ += threadNanoseconds() - start_; }
+    CpuTimer(const CpuTimer&) = delete;
+    CpuTimer& operator=(const CpuTimer&) = delete;
+
+  private:
+    std::atomic<std::int64_t>& sum_;
+    const std::int64_t start_ = threadNanoseconds();
+};
+
+// Negative and NaN become 0, what is too large the largest value.
+std::uint32_t toUint(float value) {
+    if (!(value > 0.0f)) return 0;
+    if (value >= 4294967296.0f) return std::numeric_limits<std::uint32_t>::max();
+    return static_cast<std::uint32_t>(std::lround(static_cast<double>(value)));
+}
+
+void appendValues(Bytes& bytes, ChannelType type, const float* values, std::size_t count) {
+    bytes.resize(bytes.size() + count * valueBytes(type));
+    unsigned char* to = bytes.data() + bytes.size() - count * valueBytes(type);
+    if (type == ChannelType::Float) {
+        if (count > 0) std::memcpy(to, values, count * sizeof(float));
+        return;
+    }
+    for (std::size_t i = 0; i < count; ++i)
+        if (type == ChannelType::Half) {
+            const std::uint16_t bits = imath_float_to_half(values[i]);
+            std::memcpy(to + 2 * i, &bits, sizeof bits);
+        } else {
+            const std::uint32_t bits = toUint(values[i]);
+            std::memcpy(to + 4 * i, &bits, sizeof bits);
+        }
+}
+
+// One of the flat part's values: the mean of a pixel's finite samples, of Z over its hits; 0 without any.
+float pixelMean(const float* values, const float* hits, std::uint64_t begin, std::uint64_t end) {
+    double sum = 0;
+    int count = 0;
+    for (std::uint64_t i = begin; i < end; ++i)
+        if (std::isfinite(values[i]) && (hits == nullptr || hits[i] > 0)) {
+            sum += values[i];
+            ++count;
+        }
+    return count > 0 ? static_cast<float>(sum / count) : 0.0f;
+}
+
+// Memory of a task, and what it makes; kept from band to band.
+struct Scratch {
+    explicit Scratch(DumpCompression compression) : packer(compression) {}
+    Packer packer;
+    Bytes values;
+};
+struct RowChunks {
+    Bytes beauty, samples;
+};
+
+DumpHeader sortedByName(DumpHeader header) {
+    std::sort(header.channels.begin(), header.channels.end(),
+              [](const DumpChannel& a, const DumpChannel& b) { return a.name < b.name; });
+    return header;
+}
+
+void validate(const std::string& path, const DumpHeader& header) {
+    for (const Window& window : {header.data, header.display}) {
+        const bool fits = window.width > 0 && window.height > 0 &&
+                          std::int64_t{window.x} + window.width - 1 <= kMaxInt &&
+                          std::int64_t{window.y} + window.height - 1 <= kMaxInt;
+        if (!fits)
+            throw Error(path, "expected a window with pixels, within 31-bit coordinates, found " +
+                                  windowText(window));
+    }
+    std::set<std::string> names;
+    for (const auto& channel : header.channels) {
+        if (channel.name.empty() || channel.name.size() > 255 || channel.name.find('\0') != std::string::npos)
+            throw Error(path, "expected channel names of 1 to 255 bytes, found '" + channel.name + "'");
+        if (!names.insert(channel.name).second) throw Error(path, "two channels are named " + channel.name);
+    }
+    for (const char* name : {"R", "G", "B"})
+        if (!names.contains(name)) throw Error(path, std::string("a dump needs a channel ") + name);
+    for (const auto* matrix : {&header.worldToCamera, &header.worldToNDC})
+        if (*matrix && (*matrix)->size() != 16) throw Error(path, "expected matrices of 16 values");
+    for (const auto& effect : header.effects)
+        if (effect.empty() || effect.find(',') != std::string::npos)
+            throw Error(path, "expected names of effects without commas, found '" + effect + "'");
+}
+
+}  // namespace
+
+struct DumpWriter::Impl {
+    Impl(const std::string& path, const DumpHeader& dump)
+        : header(dump),
+          sorted(sortedByName(dump)),
+          nextRow(dump.data.y),
+          file((validate(path, dump), path)),
+          disk(path, file.temporaryPath(), RawFile::Mode::Write) {
+        for (const auto& channel : sorted.channels) order.push_back(findChannel(header, channel.name));
+        for (const auto& name : beautyChannels(header)) beauty.push_back(findChannel(header, name));
+        for (const auto& channel : header.channels) bytesPerSample += valueBytes(channel.type);
+        encoded = encodeHeader(path, sorted);
+        disk.writeAt(0, encoded.bytes);
+        // Both parts have a chunk a row; their tables are filled in as chunks come.
+        beautyTable = encoded.bytes.size();
+        samplesTable = beautyTable + 8 * static_cast<std::uint64_t>(header.data.height);
+        end = samplesTable + 8 * static_cast<std::uint64_t>(header.data.height);
+        worker = std::thread([this] { work(); });
+    }
+
+    ~Impl() { stopWorker(true); }
+
+    // --- on the caller's thread ---
+
+    void check(const SampleBand& band) const {
+        const auto& window = header.data;
+        if (band.x != window.x || band.width != window.width || band.y != nextRow || band.height < 1 ||
+            band.height > std::int64_t{window.y} + window.height - nextRow)
+            throw Error(file.path(), "expected a band of columns " + std::to_string(window.x) + " to " +
+                                         std::to_string(window.x + (window.width - 1)) +
+                                         " that starts at row " + std::to_string(nextRow) +
+                                         " and ends within the data window, found " +
+                                         windowText({band.x, band.y, band.width, band.height}));
+        const auto damaged = [&](const std::string& what) {
+            throw Error(file.path(), "the band at row " + std::to_string(band.y) + " " + what);
+        };
+        if (band.offsets.size() != band.pixels() + 1 || band.offsets.front() != 0 ||
+            !std::is_sorted(band.offsets.begin(), band.offsets.end()))
+            damaged("has offsets that do not count its pixels' samples");
+        bool named =
+            band.channels.size() == header.channels.size() && band.values.size() == band.channels.size();
+        for (std::size_t c = 0; named && c < band.channels.size(); ++c)
+            named = band.channels[c] == header.channels[c].name && band.values[c].size() == band.samples();
+        if (!named) damaged("does not hold the header's channels with a value for each sample");
+        for (int row = 0; row < band.height; ++row) {
+            const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(band.width);
+            const std::uint64_t samples =
+                band.offsets[first + static_cast<std::size_t>(band.width)] - band.offsets[first];
+            if (samples > static_cast<std::uint64_t>(kMaxInt) / bytesPerSample)
+                damaged("has a row of " + std::to_string(samples) + " samples, more than OpenEXR can hold");
+        }
+    }
+
+    void enqueue(SampleBand band) {
+        std::unique_lock lock(mutex);
+        room.wait(lock, [&] { return queue.size() < kQueuedBands || failure; });
+        rethrowFailure();
+        nextRow += band.height;
+        queue.push_back(std::move(band));
+        ready.notify_one();
+    }
+
+    void finish(double renderSeconds) {
+        if (!worker.joinable()) throw Error(file.path(), "this dump is closed already");
+        stopWorker(false);
+        rethrowFailure();
+        if (nextRow != std::int64_t{header.data.y} + header.data.height)
+            throw Error(file.path(), "closed before all rows were written: row " + std::to_string(nextRow) +
+                                         " of " + windowText(header.data) + " is missing");
+        Bytes value;
+        append(value, static_cast<std::uint32_t>(std::min<std::uint64_t>(maxSamples, kMaxInt)));
+        disk.writeAt(encoded.maxSamplesPerPixel, value);
+        if (renderSeconds > 0) {
+            value.clear();
+            append(value, renderSeconds);
+            disk.writeAt(encoded.renderSeconds, value);
+        }
+        disk.close();
+        file.commit();
+    }
+
+    void rethrowFailure() const {
+        if (failure) std::rethrow_exception(failure);
+    }
+
+    void stopWorker(bool discard) {
+        if (!worker.joinable()) return;
+        {
+            const std::lock_guard lock(mutex);
+            if (discard) queue.clear();
+            closing = true;
+        }
+        ready.notify_one();
+        worker.join();
+    }
+
+    // --- on the writer's thread ---
+
+    void work() {
+        for (;;) {
+            SampleBand band;
+            {
+                std::unique_lock lock(mutex);
+                ready.wait(lock, [&] { return !queue.empty() || closing; });
+                if (queue.empty()) return;
+                band = std::move(queue.front());
+                queue.pop_front();
+            }
+            room.notify_one();
+            try {
+                writeBand(band);
+            } catch (...) {
+                const std::lock_guard lock(mutex);
+                failure = std::current_exception();
+                room.notify_all();
+                return;
+            }
+        }
+    }
+
+    void writeBand(const SampleBand& band) {
+        const auto rows = static_cast<std::size_t>(band.height);
+        if (chunks.size() < rows) chunks.resize(rows);
+        parallelFor(0, band.height, [&](std::int64_t row) {
+            const CpuTimer timer(cpu);
+            RowChunks& to = chunks[static_cast<std::size_t>(row)];
+            const auto scratch = pool.borrow();
+            encodeBeauty(band, static_cast<int>(row), *scratch, to.beauty);
+            encodeSamples(band, static_cast<int>(row), *scratch, to.samples);
+        });
+        const CpuTimer timer(cpu);
+        for (std::size_t p = 0; p < band.pixels(); ++p)
+            maxSamples = std::max(maxSamples, band.offsets[p + 1] - band.offsets[p]);
+        Bytes beautyPositions, samplesPositions;
+        for (std::size_t row = 0; row < rows; ++row) {
+            append(beautyPositions, end);
+            disk.writeAt(end, chunks[row].beauty);
+            end += chunks[row].beauty.size();
+            append(samplesPositions, end);
+            disk.writeAt(end, chunks[row].samples);
+            end += chunks[row].samples.size();
+        }
+        const auto firstRow = static_cast<std::uint64_t>(std::int64_t{band.y} - header.data.y);
+        disk.writeAt(beautyTable + 8 * firstRow, beautyPositions);
+        disk.writeAt(samplesTable + 8 * firstRow, samplesPositions);
+    }
+
+    void encodeBeauty(const SampleBand& band, int row, Scratch& scratch, Bytes& chunk) const {
+        const auto width = static_cast<std::size_t>(band.width);
+        const std::uint64_t* offsets = band.offsets.data() + static_cast<std::size_t>(row) * width;
+        const int alpha = findChannel(header, "A");
+        Bytes& means = scratch.values;
+        means.clear();
+        for (const int channel : beauty) {
+            const auto& name = header.channels[static_cast<std::size_t>(channel)].name;
+            const float* values = band.values[static_cast<std::size_t>(channel)].data();
+            const float* hits = values;  // without A, hits are what has a distance
+            if (alpha >= 0) hits = band.values[static_cast<std::size_t>(alpha)].data();
+            for (std::size_t x = 0; x < width; ++x)
+                append(means, pixelMean(values, name == "Z" ? hits : nullptr, offsets[x], offsets[x + 1]));
+        }
+        const auto packed = scratch.packer.pack(means);
+        chunk.clear();
+        append(chunk, std::uint32_t{0});
+        append(chunk, static_cast<std::int32_t>(band.y + row));
+        append(chunk, static_cast<std::uint32_t>(packed.size()));
+        chunk.insert(chunk.end(), packed.begin(), packed.end());
+    }
+
+    void encodeSamples(const SampleBand& band, int row, Scratch& scratch, Bytes& chunk) const {
+        const auto width = static_cast<std::size_t>(band.width);
+        const std::uint64_t* offsets = band.offsets.data() + static_cast<std::size_t>(row) * width;
+        const std::uint64_t samples = offsets[width] - offsets[0];
+        chunk.clear();
+        append(chunk, std::uint32_t{1});
+        append(chunk, static_cast<std::int32_t>(band.y + row));
+        const std::size_t sizes = chunk.size();
+        chunk.resize(sizes + 3 * sizeof(std::uint64_t));
+
+        scratch.values.clear();
+        for (std::size_t x = 1; x <= width; ++x)
+            append(scratch.values, static_cast<std::uint32_t>(offsets[x] - offsets[0]));
+        const auto counts = scratch.packer.pack(scratch.values);
+        const std::uint64_t countsBytes = counts.size();
+        chunk.insert(chunk.end(), counts.begin(), counts.end());
+
+        scratch.values.clear();
+        for (std::size_t c = 0; c < order.size(); ++c)
+            appendValues(scratch.values, sorted.channels[c].type,
+                         band.values[static_cast<std::size_t>(order[c])].data() + offsets[0], samples);
+        const auto packed = scratch.packer.pack(scratch.values);
+        chunk.insert(chunk.end(), packed.begin(), packed.end());
+
+        const std::uint64_t head[] = {countsBytes, packed.size(), scratch.values.size()};
+        std::memcpy(chunk.data() + sizes, head, sizeof head);
+    }
+
+    const DumpHeader header;
+    const DumpHeader sorted;  // channels in the file's order
+    std::vector<int> order;   // header's index of each channel of `sorted`
+    std::vector<int> beauty;  // header's index of each channel of the flat part
+    std::uint64_t bytesPerSample = 0;
+    EncodedHeader encoded;
+    std::int64_t nextRow;  // the caller's
+    OutputFile file;
+    RawFile disk;
+    std::uint64_t beautyTable = 0;  // from here on the worker's, while it runs
+    std::uint64_t samplesTable = 0;
+    std::uint64_t end = 0;
+    std::uint64_t maxSamples = 0;
+    std::vector<RowChunks> chunks;
+    std::atomic<std::int64_t> cpu{0};
+    mutable Pool<Scratch> pool{[this] { return std::make_unique<Scratch>(header.compression); }};
+
+    std::mutex mutex;  // guards the following
+    std::condition_variable room, ready;
+    std::deque<SampleBand> queue;
+    std::exception_ptr failure;
+    bool closing = false;
+    std::thread worker;
+};
+
+DumpWriter::DumpWriter(const std::string& path, const DumpHeader& header)
+    : impl_(std::make_unique<Impl>(path, header)) {}
+
+DumpWriter::~DumpWriter() = default;
+
+void DumpWriter::write(SampleBand band) {
+    impl_->check(band);
+    impl_->enqueue(std::move(band));
+}
+
+void DumpWriter::close(double renderSeconds) { impl_->finish(renderSeconds); }
+
+double DumpWriter::cpuSeconds() const { return static_cast<double>(impl_->cpu) * 1e-9; }
+
+}  // namespace vlx

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace vlx {
+
+/// Exit codes of every tool.
+enum ExitCode : int {
+    kDone = 0,
+    kFailed = 1,    ///< run-time failure: a file, the disk, memory
+    kBadUsage = 2,  ///< the command line
+    kPassed = 3,    ///< a comparison passed its threshold
+};
+
+/// The main function of a tool: adds --version to `app`, parses the command line, calls `run`, and turns what
+/// goes wrong into a message on stderr and an exit code. `run` returns an ExitCode; it may throw vlx::Error
+/// (exit 1) or CLI::ValidationError (options that do not fit together: exit 2).
+///
+///     int main(int argc, char** argv) {
+///         CLI::App app("What the tool does", "vlx-something");
+///         Options options;
+///         bind(app, options);
+///         return vlx::runTool(argc, argv, app, [&] { return run(options); });
+///     }
+int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run);
+
+/// Binds an option whose value is one of a few names. Anything else is bad usage, with the names listed.
+template <class Enum>
+CLI::Option* addChoice(CLI::App& app, const std::string& flag, Enum& value,
+                       const std::vector<std::pair<std::string, Enum>>& names, const std::string& help) {
+    std::string all, current;
+    for (const auto& [name, meaning] : names) {
+        all += (all.empty() ? "" : "|") + name;
+        if (meaning == value) current = name;
+    }
+    const auto choose = [flag, &value, names, all](const std::string& text) {
+        for (const auto& [name, meaning] : names)
+            if (name == text) {
+                value = meaning;
+                return;
+            }
+        throw CLI::ValidationError(flag, "expected one of " + all + ", found '" + text + "'");
+    };
+    return app.add_option_function<std::string>(flag, choose, help)->type_name(all)->default_str(current);
+}
+
+}  // namespace vlx
