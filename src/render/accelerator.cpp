@@ -1,6 +1,7 @@
 #include "accelerator.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
 
 #include <limits>
 #include <string>
@@ -150,27 +151,31 @@ struct Accelerator::Impl {
         rtcReleaseGeometry(geometry);
     }
 
+    void build() {
+        for (const Group& group : scene.groups) {
+            groups.push_back(newScene());
+            for (std::uint32_t i = 0; i < group.shapes; ++i) attachShape(groups.back(), group.firstShape + i, i);
+            rtcJoinCommitScene(groups.back());
+        }
+        top = newScene();
+        for (std::uint32_t i = 0; i < scene.worldShapes; ++i) attachShape(top, i, i);
+        attachSpheres();
+        for (std::size_t i = 0; i < scene.instances.size(); ++i)
+            attachInstance(scene.instances[i], firstInstance() + static_cast<std::uint32_t>(i));
+        rtcJoinCommitScene(top);
+    }
+
     std::uint32_t firstInstance() const { return scene.worldShapes + 1; }
 };
 
 Accelerator::Accelerator(const Scene& scene) : impl_(new Impl(scene)) {
     Impl& im = *impl_;
-    // Built by one thread: where two surfaces coincide the hit depends on the tree, and the image must not
-    // depend on the number of threads.
-    im.device = rtcNewDevice("threads=1,set_affinity=0");
+    im.device = rtcNewDevice("set_affinity=0");
     check(im.device);
     im.filters.resize(scene.shapes.size());
-    for (const Group& group : scene.groups) {
-        im.groups.push_back(im.newScene());
-        for (std::uint32_t i = 0; i < group.shapes; ++i) im.attachShape(im.groups.back(), group.firstShape + i, i);
-        rtcCommitScene(im.groups.back());
-    }
-    im.top = im.newScene();
-    for (std::uint32_t i = 0; i < scene.worldShapes; ++i) im.attachShape(im.top, i, i);
-    im.attachSpheres();
-    for (std::size_t i = 0; i < scene.instances.size(); ++i)
-        im.attachInstance(scene.instances[i], im.firstInstance() + static_cast<std::uint32_t>(i));
-    rtcCommitScene(im.top);
+    // Built by one thread: where two surfaces coincide the hit depends on the tree, and the image must not
+    // depend on the number of threads.
+    tbb::task_arena(1).execute([&] { im.build(); });
     check(im.device);
 }
 

@@ -1,5 +1,7 @@
 #include "bsdf.h"
 
+#include "sampling.h"
+
 namespace vlx::render {
 namespace {
 

@@ -66,7 +66,9 @@ Texture GltfFile::image(int index, ColourSpace space) const {
     OIIO::Filesystem::IOMemReader memory(const_cast<unsigned char*>(bytes.data()), bytes.size());
     OIIO::ImageSpec config;
     config["oiio:UnassociatedAlpha"] = 1;
-    const auto in = OIIO::ImageInput::open("memory" + format, &config, &memory);
+    OIIO::Filesystem::IOProxy* proxy = &memory;
+    config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+    const auto in = OIIO::ImageInput::open("memory" + format, &config);
     if (!in) fail(what + " cannot be decoded: " + OIIO::geterror());
     const OIIO::ImageSpec spec = in->spec();
     if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 ||
