@@ -138,11 +138,9 @@ BsdfValue Bsdf::glass(const Vec3& wi) const {
     const float cosO = dot(wo_, h), cosI = dot(wi, h);
     if (cosO <= 0 || cosI >= 0) return {};
     const GlassSplit split = splitAt(cosO);
-    // |dh/dwi| = eta^2 |wi.h| / (wo.h + eta wi.h)^2; the value's 1/eta^2 for radiance cancels its eta^2.
-    const float jacobian = -cosI / square(cosO + eta_ * cosI);
+    const float jacobian = eta_ * eta_ * -cosI / square(cosO + eta_ * cosI);  // |dh/dwi|
     const float common = ggx.d(h) * cosO / wo_.z * jacobian;
-    return {split.transmitted * (glassWeight_ * common * g2),
-            (1 - split.reflectProbability) * common * g1 * eta_ * eta_};
+    return {split.transmitted * (glassWeight_ * common * g2), (1 - split.reflectProbability) * common * g1};
 }
 
 BsdfValue Bsdf::evaluate(const Vec3& wi) const {
@@ -166,13 +164,13 @@ BsdfValue Bsdf::evaluate(const Vec3& wi) const {
 BsdfSample Bsdf::finish(const Vec3& wi) const {
     const BsdfValue v = evaluate(wi);
     if (!(v.pdf > 0)) return {};
-    return {wi, v.value / v.pdf, v.pdf, false, wi.z < 0 ? eta_ * eta_ : 1};
+    return {wi, v.value / v.pdf, v.pdf, false};
 }
 
 BsdfSample Bsdf::sampleReflection(float alpha, const Rgb& f0, const Rgb& f90, Vec2 u, Lobe lobe) const {
     if (alpha < kSmoothAlpha) {
         const float scale = (lobe == kCoat ? coat_ : base_) / probability_[lobe];
-        return {{-wo_.x, -wo_.y, wo_.z}, fresnel(f0, f90, schlickWeight(wo_.z)) * scale, 0, true, 1};
+        return {{-wo_.x, -wo_.y, wo_.z}, fresnel(f0, f90, schlickWeight(wo_.z)) * scale, 0, true};
     }
     const Vec3 wi = reflected(wo_, Ggx{alpha}.sampleVisible(wo_, u));
     return wi.z > 0 ? finish(wi) : BsdfSample{};
@@ -186,9 +184,8 @@ BsdfSample Bsdf::sampleGlass(Vec2 u, float choice) const {
     if (reflects ? wi.z <= 0 : wi.z >= 0) return {};
     if (!glassSmooth_) return finish(wi);
     const float scale = glassWeight_ / probability_[kGlass];
-    if (reflects) return {wi, split.reflected * (scale / split.reflectProbability), 0, true, 1};
-    const float eta2 = eta_ * eta_;
-    return {wi, split.transmitted * (scale / ((1 - split.reflectProbability) * eta2)), 0, true, eta2};
+    if (reflects) return {wi, split.reflected * (scale / split.reflectProbability), 0, true};
+    return {wi, split.transmitted * (scale / (1 - split.reflectProbability)), 0, true};
 }
 
 BsdfSample Bsdf::sample(Vec2 direction, float choice) const {

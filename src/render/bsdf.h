@@ -33,7 +33,6 @@ struct BsdfSample {
     Rgb weight;             ///< f |cos wi| / pdf; 0: the path ends here
     float pdf = 0;          ///< of all lobes together; meaningless for delta lobes
     bool delta = false;     ///< perfectly smooth reflection or refraction
-    float etaSquared = 1;   ///< squared relative index crossed; radiance is divided by it
 };
 
 /// Scattering at a point of a glTF surface, in the local frame whose z axis is the shading normal on the
@@ -46,9 +45,10 @@ struct BsdfSample {
 ///   multiple scattering is returned by Kulla and Conty's lobe.
 /// - diffuse: base colour / pi x (1-Ed(wo)) (1-Ed(wi)) / (1 - mean Ed), Ed being the dielectric reflection's
 ///   albedo: what is not reflected enters. Reciprocal, and a white surface returns exactly what it gets.
-/// - glass (weight (1-metallic) transmission): refraction by the exact Fresnel term, tinted by the base
-///   colour, radiance scaled by 1/eta^2; rough glass is divided by its single-scattering albedo.
-///   The surface bounds a solid: light refracts on entering and on leaving.
+/// - glass (weight (1-metallic) transmission): reflection and refraction by the exact Fresnel term, refraction
+///   tinted by the base colour; rough glass is divided by its single-scattering albedo. The surface bounds a
+///   solid: light refracts on entering and on leaving. What is carried is basic radiance L / n^2, n being the
+///   index of the medium, which refraction leaves as it is; emission is given in it too.
 /// - coat: GGX with f0 = 0.04, Ec its albedo times the clearcoat factor. Scaling by the view direction only
 ///   keeps energy for every base, at the price of reciprocity: f(wo, wi) has wo towards the camera.
 class Bsdf {

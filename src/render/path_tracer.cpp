@@ -20,9 +20,9 @@ Ray leave(const SurfacePoint& point, const Vec3& direction) {
 }
 
 /// Whether a direction is on the same side of the true and of the shading surface: light that only one of them
-/// lets through is a leak.
+/// lets through an opaque surface is a leak. Through glass it goes on, on the side where it truly is.
 bool consistent(const SurfacePoint& point, const Vec3& direction, float localZ) {
-    return dot(point.geometricNormal, direction) * localZ > 0;
+    return point.material->transmissive() || dot(point.geometricNormal, direction) * localZ > 0;
 }
 
 }  // namespace
@@ -48,7 +48,6 @@ Rgb PathTracer::directLight(const SurfacePoint& point, const Frame& frame, const
 PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
     PathSample result;
     Rgb throughput{1, 1, 1};
-    float etaScale = 1;           // undoes radiance's 1/eta^2 for roulette
     bool lightsSampled = false;   // at the previous vertex, so that what a ray meets by chance shares its weight
     float bsdfPdf = 0;            // of the ray
     Receiver receiver;            // the previous vertex
@@ -125,11 +124,10 @@ PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
         const Vec3 direction = normalized(frame.toWorld(next.wi));
         if (!consistent(point, direction, next.wi.z)) break;
         throughput *= next.weight;
-        etaScale *= next.etaSquared;
         bsdfPdf = next.pdf;
         lightsSampled = lightsSampled && !next.delta;
         if (bounce >= kSureBounces) {
-            const float survival = std::min(1.f, maxComponent(throughput) * etaScale);
+            const float survival = std::min(1.f, maxComponent(throughput));
             if (choice.y >= survival) break;
             throughput *= 1 / survival;
         }
