@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "vec.h"
+
+namespace vlx::render {
+
+struct Scene;
+
+/// The nearest thing that a ray meets: a triangle of a shape, or a sphere light.
+struct Hit {
+    float distance = 0;
+    float u = 0;  ///< barycentric coordinates of the second and third corner
+    float v = 0;
+    std::uint32_t shape = 0;
+    std::uint32_t triangle = 0;   ///< of the shape
+    std::int32_t instance = -1;   ///< -1: the shape is in world space
+    std::int32_t light = -1;      ///< a sphere light's index, or -1: then the rest is meaningless
+};
+
+/// Hit tests through Embree: a static scene, robust (watertight) traversal. Surfaces that let rays through
+/// (alpha mask and blend, backs of single-sided surfaces) have filters; others pay nothing for them. Blended
+/// surfaces are met with the probability of their opacity, decided by a hash of the ray's seed and the
+/// triangle: the same for as long as the seed is the same.
+class Accelerator {
+  public:
+    /// Refers to the scene's vertices and triangles, which must outlive it unchanged. Throws Error when
+    /// Embree fails (out of memory).
+    explicit Accelerator(const Scene& scene);
+    ~Accelerator();
+    Accelerator(const Accelerator&) = delete;
+    Accelerator& operator=(const Accelerator&) = delete;
+
+    std::optional<Hit> intersect(const Ray& ray, std::uint32_t seed) const;
+    /// Whether something lies on the ray before `distance`.
+    bool occluded(const Ray& ray, float distance, std::uint32_t seed) const;
+
+    /// The Embree scene (RTCScene), for the benchmark.
+    void* embreeScene() const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vlx::render

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "transform.h"
+#include "vec.h"
+
+namespace vlx::render {
+
+/// A glTF perspective camera: looks along its own -z, y up.
+struct Camera {
+    std::string name;
+    Transform toWorld;        ///< rotation and translation
+    float verticalFov = 0.8f;  ///< radians
+    float aspect = 0;          ///< width / height; 0: as the image
+    float lensRadius = 0;      ///< metres; 0: pinhole
+    float focusDistance = 0;   ///< along the axis; used when lensRadius > 0
+    std::string unusable;      ///< why it cannot be rendered from (orthographic, ...); empty when it can
+};
+
+/// A camera with an image size: rays through raster positions (x right, y down, pixel (i, j) covers
+/// [i, i+1) x [j, j+1)). The vertical field of view spans the image's height; pixels are square.
+class View {
+  public:
+    View(const Camera& camera, int width, int height);
+
+    /// `lens` in [0, 1)^2: the point on the lens.
+    Ray ray(float x, float y, Vec2 lens) const;
+
+    bool hasLens() const { return lensRadius_ > 0; }
+
+    /// OpenEXR's header attributes: 16 values, row vectors (p' = p M). NDC: x right, y up, both in [-1, 1].
+    std::vector<float> worldToCamera() const;
+    std::vector<float> worldToNdc() const;
+
+  private:
+    Transform toWorld_;
+    double width_, height_;
+    double tanHalf_;
+    Vec3 origin_;
+    Vec3 corner_;  ///< direction through raster (0, 0), at unit distance along the axis
+    Vec3 dx_, dy_;
+    Vec3 lensX_, lensY_;
+    float lensRadius_;
+    float focusDistance_;
+};
+
+}  // namespace vlx::render

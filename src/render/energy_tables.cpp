@@ -1,0 +1,133 @@
+#include "energy_tables.h"
+
+#include "variolux/base/parallel.h"
+#include "variolux/base/sobol.h"
+
+namespace vlx::render {
+namespace {
+
+constexpr std::uint32_t kPoints = 1024;
+
+/// Cosine of node `j` of `size`; never quite 0, where directions lie in the surface.
+float nodeCosine(std::size_t j, std::size_t size) {
+    return std::max(1e-3f, square(static_cast<float>(j) / static_cast<float>(size - 1)));
+}
+
+Vec3 directionAt(float cosTheta) { return {std::sqrt(std::max(0.f, 1 - square(cosTheta))), 0, cosTheta}; }
+
+/// Point k of the quadrature, at the middle of its elementary intervals.
+Vec2 quadraturePoint(std::uint32_t k) {
+    const SobolPoint p = sobolPoint(k);
+    constexpr float half = 0.5f / kPoints;
+    return {unitFloat(p.x) + half, unitFloat(p.y) + half};
+}
+
+Albedo integrateReflection(float cosTheta, float roughness) {
+    const Ggx ggx{square(roughness)};
+    if (ggx.alpha < kSmoothAlpha) return {1, schlickWeight(cosTheta)};
+    const Vec3 wo = directionAt(cosTheta);
+    const float lambdaO = ggx.lambda(wo);
+    double whole = 0, grazing = 0;
+    for (std::uint32_t k = 0; k < kPoints; ++k) {
+        const Vec3 h = ggx.sampleVisible(wo, quadraturePoint(k));
+        const Vec3 wi = reflected(wo, h);
+        if (wi.z <= 0) continue;
+        const float weight = (1 + lambdaO) / (1 + lambdaO + ggx.lambda(wi));  // G2 / G1
+        whole += weight;
+        grazing += weight * schlickWeight(dot(wo, h));
+    }
+    return {static_cast<float>(whole / kPoints), static_cast<float>(grazing / kPoints)};
+}
+
+float integrateGlass(float cosTheta, float roughness, float eta) {
+    const Ggx ggx{square(roughness)};
+    if (ggx.alpha < kSmoothAlpha) return 1;
+    const Vec3 wo = directionAt(cosTheta);
+    const float lambdaO = ggx.lambda(wo);
+    double kept = 0;
+    for (std::uint32_t k = 0; k < kPoints; ++k) {
+        const Vec3 h = ggx.sampleVisible(wo, quadraturePoint(k));
+        const auto weight = [&](const Vec3& wi) { return (1 + lambdaO) / (1 + lambdaO + ggx.lambda(wi)); };
+        const float fresnel = dielectricFresnel(dot(wo, h), eta);
+        const Vec3 mirror = reflected(wo, h);
+        if (mirror.z > 0) kept += fresnel * weight(mirror);
+        if (fresnel >= 1) continue;
+        const Vec3 through = refracted(wo, h, eta);
+        if (through.z < 0) kept += (1 - fresnel) * weight(through);
+    }
+    return static_cast<float>(kept / kPoints);
+}
+
+struct Position {
+    std::size_t cell;
+    float t;
+};
+
+/// Where a node coordinate in [0, 1] falls among `size` nodes.
+Position locate(float coordinate, std::size_t size) {
+    const float scaled = std::clamp(coordinate, 0.f, 1.f) * static_cast<float>(size - 1);
+    const std::size_t cell = std::min(static_cast<std::size_t>(scaled), size - 2);
+    return {cell, scaled - static_cast<float>(cell)};
+}
+
+}  // namespace
+
+AlbedoTable::AlbedoTable() {
+    parallelFor(0, static_cast<std::int64_t>(kSize), [&](std::int64_t row) {
+        const auto i = static_cast<std::size_t>(row);
+        const float roughness = static_cast<float>(i) / static_cast<float>(kSize - 1);
+        for (std::size_t j = 0; j < kSize; ++j)
+            cells_[i][j] = integrateReflection(nodeCosine(j, kSize), roughness);
+        // Mean = 2 integral of albedo mu dmu = 4 integral of albedo(s^2) s^3 ds, s = sqrt(mu), of the table's
+        // own piecewise linear interpolant: three-point Gauss is exact (degree 4 in s).
+        double whole = 0, grazing = 0;
+        for (std::size_t j = 0; j + 1 < kSize; ++j) {
+            constexpr std::array<std::array<double, 2>, 3> gauss{
+                {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
+            for (const auto& [t, w] : gauss) {
+                const double s = (static_cast<double>(j) + t) / (kSize - 1);
+                const double weight = 4 * s * s * s * w / (kSize - 1);
+                const Albedo &a = cells_[i][j], &b = cells_[i][j + 1];
+                whole += weight * ((1 - t) * a.whole + t * b.whole);
+                grazing += weight * ((1 - t) * a.grazing + t * b.grazing);
+            }
+        }
+        means_[i] = {static_cast<float>(whole), static_cast<float>(grazing)};
+    });
+}
+
+AlbedoTable::Row AlbedoTable::row(float roughness) const {
+    const auto [i, t] = locate(roughness, kSize);
+    Row row;
+    row.low_ = cells_[i].data();
+    row.high_ = cells_[i + 1].data();
+    row.t_ = t;
+    row.mean_ = means_[i] * (1 - t) + means_[i + 1] * t;
+    return row;
+}
+
+Albedo AlbedoTable::Row::at(float cosTheta) const {
+    const auto [j, t] = locate(std::sqrt(std::max(0.f, cosTheta)), kSize);
+    return (low_[j] * (1 - t) + low_[j + 1] * t) * (1 - t_) + (high_[j] * (1 - t) + high_[j + 1] * t) * t_;
+}
+
+GlassTable::GlassTable(float ior) : ior_(ior) {
+    parallelFor(0, static_cast<std::int64_t>(kSize), [&](std::int64_t row) {
+        const auto i = static_cast<std::size_t>(row);
+        const float roughness = static_cast<float>(i) / static_cast<float>(kSize - 1);
+        for (std::size_t j = 0; j < kSize; ++j) {
+            sides_[0][i][j] = integrateGlass(nodeCosine(j, kSize), roughness, ior);
+            sides_[1][i][j] = integrateGlass(nodeCosine(j, kSize), roughness, 1 / ior);
+        }
+    });
+}
+
+float GlassTable::kept(float cosTheta, float roughness, bool fromInside) const {
+    const Side& side = sides_[fromInside ? 1 : 0];
+    const auto [i, s] = locate(roughness, kSize);
+    const auto [j, t] = locate(std::sqrt(std::max(0.f, cosTheta)), kSize);
+    const auto along = [&](std::size_t r) { return side[r][j] * (1 - t) + side[r][j + 1] * t; };
+    return along(i) * (1 - s) + along(i + 1) * s;
+}
+
+}  // namespace vlx::render

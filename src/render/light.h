@@ -1,0 +1,132 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sampling.h"
+#include "vec.h"
+
+namespace vlx::render {
+
+struct Scene;
+
+enum class LightType : std::uint8_t { Point, Spot, Directional, Sphere, Mesh, Environment };
+
+/// A light as next-event estimation sees it. Radiometric units.
+struct Light {
+    LightType type = LightType::Point;
+    std::string name;
+    /// Point, Spot, Sphere: W/sr. Directional: W/m2 across the beam. Mesh: mean radiance.
+    Rgb intensity;
+    Vec3 position;   ///< also the centre of a mesh light's bounds
+    Vec3 direction;  ///< unit, in which light travels (Spot, Directional, a spot's sphere)
+    float radius = 0;  ///< of a sphere; of a mesh light's bounds
+    /// KHR_lights_punctual's cone: factor clamp(cos x scale + offset, 0, 1)^2; 0 and 1 for all around.
+    float coneScale = 0;
+    float coneOffset = 1;
+
+    // Mesh lights:
+    std::uint32_t shape = 0;
+    float area = 0;
+    Distribution triangles;        ///< chosen by power
+    std::vector<float> density;    ///< per triangle: probability / area
+
+    /// Factor of the cone towards a unit vector that leaves the light.
+    float cone(const Vec3& away) const {
+        return square(std::clamp(dot(away, direction) * coneScale + coneOffset, 0.f, 1.f));
+    }
+    /// Radiance of a sphere light's surface towards `away`: intensity spread over its disk.
+    Rgb sphereRadiance(const Vec3& away) const {
+        return intensity * (cone(away) / (kPi * radius * radius));
+    }
+};
+
+/// Radiance from far away: nothing, a constant, or a latitude-longitude image (rows from +y down; its middle
+/// column is -z, +x lies to the right of it).
+class Environment {
+  public:
+    Environment() = default;
+    explicit Environment(const Rgb& constant);
+    /// `pixels` row by row, finite and >= 0.
+    Environment(int width, int height, std::vector<Rgb> pixels);
+
+    explicit operator bool() const { return present_; }
+    bool isConstant() const { return pixels_.empty(); }
+    Rgb radiance(const Vec3& direction) const;
+    /// Mean over the sphere.
+    const Rgb& mean() const { return mean_; }
+
+    struct Sample {
+        Vec3 direction;
+        float pdf = 0;
+    };
+    /// Images by luminance. A constant by the cosine about `normal`, or uniformly when light from behind
+    /// counts too (`bothSides`).
+    Sample sample(const Vec3& normal, bool bothSides, Vec2 u) const;
+    float pdf(const Vec3& direction, const Vec3& normal, bool bothSides) const;
+
+  private:
+    bool present_ = false;
+    Rgb constant_;
+    Rgb mean_;
+    int width_ = 0;
+    int height_ = 0;
+    std::vector<Rgb> pixels_;
+    Distribution rows_;
+    std::vector<Distribution> columns_;  ///< one a row
+};
+
+/// The point that is lit: its shading normal lets lights behind an opaque surface be left out.
+struct Receiver {
+    Vec3 position;
+    Vec3 normal;
+    bool bothSides = false;  ///< light from behind counts (glass)
+};
+
+/// Direct light towards a receiver: a direction, what arrives along it unoccluded, and how likely it was.
+struct LightSample {
+    Vec3 direction;
+    float distance = 0;    ///< of the shadow ray
+    Rgb radiance;          ///< for delta lights: irradiance across the beam
+    float pdf = 0;         ///< per solid angle, choice of light included; for delta lights the latter only
+    bool delta = false;
+};
+
+/// Chooses among the lights of a scene in proportion to their unoccluded irradiance at the receiver (an
+/// estimate, with a floor for all that can reach it), or, beyond kLocalLights, to their power.
+/// Refers to the scene, which must outlive it.
+class LightSampler {
+  public:
+    static constexpr std::size_t kLocalLights = 32;
+
+    explicit LightSampler(const Scene& scene);
+
+    bool empty() const { return lights_.empty(); }
+    LightSample sample(const Receiver& receiver, float choice, Vec2 u) const;
+    /// Density with which sample() would have chosen the direction from `receiver` to a point of triangle
+    /// `triangle` (of its shape) of mesh light `light`, at `distance`, the light's cosine being `cosLight`.
+    float meshPdf(const Receiver& receiver, std::uint32_t light, std::uint32_t triangle, float distance,
+                  float cosLight) const;
+    float spherePdf(const Receiver& receiver, std::uint32_t light) const;
+    float environmentPdf(const Receiver& receiver, const Vec3& direction) const;
+
+  private:
+    struct Choice {
+        std::size_t light = 0;
+        float probability = 0;
+    };
+    Choice choose(const Receiver& receiver, float u) const;
+    float probability(const Receiver& receiver, std::size_t light) const;
+    float importance(const Receiver& receiver, const Light& light) const;
+
+    LightSample sampleMesh(const Receiver& receiver, const Light& light, Vec2 u) const;
+    LightSample sampleSphere(const Receiver& receiver, const Light& light, Vec2 u) const;
+
+    const Scene* scene_;
+    const std::vector<Light>& lights_;
+    Distribution byPower_;
+    std::int64_t environmentLight_ = -1;
+};
+
+}  // namespace vlx::render

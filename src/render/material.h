@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "texture.h"
+#include "vec.h"
+
+namespace vlx::render {
+
+enum class AlphaMode : std::uint8_t { Opaque, Mask, Blend };
+
+/// A glTF material: metallic-roughness with the extensions transmission, ior, specular, clearcoat and
+/// emissive_strength. Textures multiply the factors, as the specifications say.
+struct Material {
+    std::string name;
+
+    Rgb baseColour{1, 1, 1};
+    float opacity = 1;             ///< baseColorFactor's alpha
+    TextureRef baseColourTexture;  ///< rgb: colour, a: opacity
+    float metallic = 1;
+    float roughness = 1;  ///< perceptual; GGX alpha is its square
+    TextureRef metallicRoughnessTexture;  ///< g: roughness, b: metallic
+    Rgb emission{0, 0, 0};                ///< radiance: emissiveFactor x emissiveStrength
+    TextureRef emissionTexture;
+    float normalScale = 1;
+    TextureRef normalTexture;
+
+    float transmission = 0;
+    TextureRef transmissionTexture;  ///< r
+    float ior = 1.5f;
+    float specular = 1;
+    TextureRef specularTexture;  ///< a
+    Rgb specularColour{1, 1, 1};
+    TextureRef specularColourTexture;
+    float clearcoat = 0;
+    TextureRef clearcoatTexture;  ///< r
+    float clearcoatRoughness = 0;
+    TextureRef clearcoatRoughnessTexture;  ///< g
+
+    AlphaMode alphaMode = AlphaMode::Opaque;
+    float alphaCutoff = 0.5f;
+    bool doubleSided = false;
+
+    /// Index into the scene's glass tables, -1 when not rough transmissive.
+    int glassTable = -1;
+
+    bool emissive() const { return !isBlack(emission); }
+    bool transmissive() const { return transmission > 0 && metallic < 1; }
+    /// Seen from behind: double-sided, or a boundary of a solid that light crosses.
+    bool visibleFromBehind() const { return doubleSided || transmissive(); }
+};
+
+}  // namespace vlx::render

@@ -1,0 +1,232 @@
+#include "render.h"
+
+#include <array>
+#include <atomic>
+#include <cassert>
+#include <chrono>
+
+#include "effects.h"
+#include "variolux/base/parallel.h"
+#include "variolux/dump/writer.h"
+
+namespace vlx::render {
+namespace {
+
+constexpr int kBandRows = 16;
+/// Bands are made lower until they hold at most this many samples, at about 120 bytes each.
+constexpr std::int64_t kBandSamples = 1 << 22;
+
+/// Everything about one sample that goes into the dump.
+struct Record {
+    int pixel;  ///< inside the region, row by row
+    float x, y;
+    std::uint32_t replicate;
+    PathSample sample;
+};
+
+/// A region's samples while its band is traced.
+struct RegionResult {
+    Window window;  ///< its pixels inside the data window
+    std::vector<Record> records;
+    std::array<std::uint32_t, kRegionSize * kRegionSize> counts{};
+    std::vector<int> refined;
+    std::uint64_t nonFinite = 0;
+};
+
+int floorToRegion(int v) { return v / kRegionSize * kRegionSize; }
+
+/// The part of region (rx, ry) inside `window`.
+Window clipped(int rx, int ry, const Window& window) {
+    const int x0 = std::max(rx * kRegionSize, window.x), y0 = std::max(ry * kRegionSize, window.y);
+    const int x1 = std::min((rx + 1) * kRegionSize, window.x + window.width);
+    const int y1 = std::min((ry + 1) * kRegionSize, window.y + window.height);
+    return {x0, y0, x1 - x0, y1 - y0};
+}
+
+DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& options) {
+    DumpHeader header;
+    header.display = {0, 0, options.width, options.height};
+    header.data = options.crop.value_or(header.display);
+    header.channels = standardChannels();
+    if (options.replicates == 1) header.channels.pop_back();  // sample.replicate
+    header.compression = options.compression;
+    header.renderer = "vlx-trace" + (options.version.empty() ? "" : " " + options.version);
+    header.scene = scene.name;
+    header.pixelFilter = "box";
+    header.effects = sceneEffects(scene, scene.cameras[options.camera], options.path.maxBounces);
+    header.seed = static_cast<std::int64_t>(options.seed);
+    if (!options.hierarchical) header.samples = options.spp;
+    header.worldToCamera = view.worldToCamera();
+    header.worldToNDC = view.worldToNdc();
+    return header;
+}
+
+class BandTracer {
+  public:
+    BandTracer(const PathTracer& tracer, const View& view, const RenderOptions& options, const DumpHeader& header)
+        : tracer_(tracer), view_(view), options_(options), header_(header) {}
+
+    /// Traces the rows of `rows` (the data window's columns).
+    SampleBand trace(const Window& rows, const std::function<void(std::int64_t)>& regionDone) {
+        const int firstX = rows.x / kRegionSize, firstY = rows.y / kRegionSize;
+        const int across = (rows.x + rows.width - 1) / kRegionSize - firstX + 1;
+        const int down = (rows.y + rows.height - 1) / kRegionSize - firstY + 1;
+        regions_.resize(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
+        const auto count = static_cast<std::int64_t>(regions_.size());
+        parallelFor(0, count, [&](std::int64_t i) {
+            const int rx = firstX + static_cast<int>(i % across), ry = firstY + static_cast<int>(i / across);
+            traceRegion(rx, ry, rows, regions_[static_cast<std::size_t>(i)]);
+            regionDone(1);
+        });
+        return gather(rows);
+    }
+
+    const std::vector<RegionResult>& regions() const { return regions_; }
+
+  private:
+    void traceRegion(int rx, int ry, const Window& rows, RegionResult& out) const {
+        out.window = clipped(rx, ry, rows);
+        out.records.clear();
+        out.counts.fill(0);
+        out.nonFinite = 0;
+        const int left = rx * kRegionSize, top = ry * kRegionSize;
+        const Shade shade = [&](const CameraSample& s) {
+            const PathSampler sampler(s.seed, s.index);
+            const Vec2 lens = view_.hasLens() ? sampler.pair(dimension::kLens) : Vec2{};
+            PathSample sample = tracer_.trace(view_.ray(s.x, s.y, lens), sampler);
+            if (!isFinite(sample.radiance)) {
+                ++out.nonFinite;
+                sample.radiance = {};
+            }
+            const int pixel = (s.row - top) * kRegionSize + (s.column - left);
+            ++out.counts[static_cast<std::size_t>(pixel)];
+            out.records.push_back({pixel, s.x, s.y, s.replicate, sample});
+            return sample.radiance;
+        };
+        if (options_.hierarchical) {
+            out.refined = sampleHierarchically(out.window, rx, ry, options_.refinement, options_.seed, shade);
+        } else {
+            sampleUniformly(out.window, options_.spp, options_.replicates, options_.seed, shade);
+        }
+    }
+
+    /// The regions' samples in the band's order: pixel by pixel, each pixel's in the order they were taken.
+    SampleBand gather(const Window& rows) const {
+        SampleBand band;
+        band.x = rows.x;
+        band.y = rows.y;
+        band.width = rows.width;
+        band.height = rows.height;
+        band.offsets.assign(band.pixels() + 1, 0);
+        const auto forPixels = [&](const RegionResult& region, auto visit) {
+            const int left = floorToRegion(region.window.x), top = floorToRegion(region.window.y);
+            for (int y = region.window.y; y < region.window.y + region.window.height; ++y)
+                for (int x = region.window.x; x < region.window.x + region.window.width; ++x)
+                    visit(static_cast<std::size_t>((y - top) * kRegionSize + (x - left)),
+                          static_cast<std::size_t>(y - rows.y) * static_cast<std::size_t>(rows.width) +
+                              static_cast<std::size_t>(x - rows.x));
+        };
+        for (const RegionResult& region : regions_)
+            forPixels(region, [&](std::size_t local, std::size_t pixel) {
+                band.offsets[pixel + 1] = region.counts[local];
+            });
+        for (std::size_t p = 0; p < band.pixels(); ++p) band.offsets[p + 1] += band.offsets[p];
+        for (const DumpChannel& channel : header_.channels) {
+            band.channels.push_back(channel.name);
+            band.values.emplace_back(band.samples());
+        }
+        parallelFor(0, static_cast<std::int64_t>(regions_.size()), [&](std::int64_t i) {
+            const RegionResult& region = regions_[static_cast<std::size_t>(i)];
+            std::array<std::uint64_t, kRegionSize * kRegionSize> next{};
+            forPixels(region, [&](std::size_t local, std::size_t pixel) { next[local] = band.offsets[pixel]; });
+            for (const Record& r : region.records) {
+                const PathSample& s = r.sample;
+                const std::array<float, 14> values = {
+                    s.radiance.x, s.radiance.y, s.radiance.z, s.hit ? 1.f : 0.f, s.depth,
+                    r.x,          r.y,          s.albedo.x,   s.albedo.y,        s.albedo.z,
+                    s.normal.x,   s.normal.y,   s.normal.z,   static_cast<float>(r.replicate)};
+                const std::uint64_t at = next[static_cast<std::size_t>(r.pixel)]++;
+                for (std::size_t c = 0; c < band.values.size(); ++c) band.values[c][at] = values[c];
+            }
+        });
+        return band;
+    }
+
+    const PathTracer& tracer_;
+    const View& view_;
+    const RenderOptions& options_;
+    const DumpHeader& header_;
+    std::vector<RegionResult> regions_;
+};
+
+}  // namespace
+
+std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
+    constexpr int kMost = 1 << 20;
+    if (width < 1 || height < 1 || width > kMost || height > kMost)
+        return "width and height must be 1 to " + std::to_string(kMost);
+    if (crop) {
+        const bool inside = crop->width >= 1 && crop->height >= 1 && crop->x >= 0 && crop->y >= 0 &&
+                            crop->x <= width - crop->width && crop->y <= height - crop->height;
+        if (!inside) return "the crop must lie inside the picture of " + std::to_string(width) + "x" + std::to_string(height);
+    }
+    if (camera >= scene.cameras.size())
+        return "camera " + std::to_string(camera) + " does not exist, the scene has " + std::to_string(scene.cameras.size());
+    const Camera& c = scene.cameras[camera];
+    if (!c.unusable.empty()) return "camera '" + c.name + "' cannot be used: " + c.unusable;
+    if (spp < 1 || spp > 1 << 24) return "spp must be 1 to 2^24";
+    if (replicates < 1 || spp % replicates != 0) return "replicates must divide spp";
+    if (hierarchical && replicates != 1) return "hierarchical sampling has one randomisation, not replicates";
+    if (!(refinement.tolerance >= 0)) return "tolerance must be 0 or more";
+    if (refinement.levels < 1 || refinement.levels > 5) return "levels must be 1 to 5";
+    if (path.maxBounces < 0 || path.maxBounces > 1 << 16) return "max bounces must be 0 to 65536";
+    return std::nullopt;
+}
+
+RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, const std::string& path,
+                        const RenderOptions& options, const Progress& progress) {
+    assert(!options.validate(scene));
+    const View view(scene.cameras[options.camera], options.width, options.height);
+    const PathTracer tracer(scene, accelerator, options.path);
+    const DumpHeader header = headerOf(scene, view, options);
+    const Window& window = header.data;
+    DumpWriter writer(path, header);
+    BandTracer bands(tracer, view, options, header);
+
+    const std::int64_t mostSpp =
+        options.hierarchical ? std::int64_t{1} << (2 * (options.refinement.levels - 1)) : options.spp;
+    int bandRows = kBandRows;
+    while (bandRows > kRegionSize && bandRows * mostSpp * window.width > kBandSamples) bandRows -= kRegionSize;
+
+    const int regionsAcross = (window.x + window.width - 1) / kRegionSize - window.x / kRegionSize + 1;
+    const int regionsDown = (window.y + window.height - 1) / kRegionSize - window.y / kRegionSize + 1;
+    const std::int64_t total = std::int64_t{regionsAcross} * regionsDown;
+    std::atomic<std::int64_t> done = 0;
+    const auto regionDone = [&](std::int64_t n) {
+        const std::int64_t now = done += n;
+        if (progress) progress(now, total);
+    };
+
+    RenderReport report;
+    using Clock = std::chrono::steady_clock;
+    for (int y = window.y; y < window.y + window.height;) {
+        const int end = std::min(floorToRegion(y) + bandRows, window.y + window.height);
+        const auto start = Clock::now();
+        SampleBand band = bands.trace({window.x, y, window.width, end - y}, regionDone);
+        report.traceSeconds += std::chrono::duration<double>(Clock::now() - start).count();
+        report.samples += band.samples();
+        for (const RegionResult& region : bands.regions()) {
+            report.nonFinite += region.nonFinite;
+            report.refinedCells.resize(std::max(report.refinedCells.size(), region.refined.size()));
+            for (std::size_t i = 0; i < region.refined.size(); ++i)
+                report.refinedCells[i] += static_cast<std::uint64_t>(region.refined[i]);
+        }
+        writer.write(std::move(band));
+        y = end;
+    }
+    writer.close(report.traceSeconds);
+    report.writeCpuSeconds = writer.cpuSeconds();
+    return report;
+}
+
+}  // namespace vlx::render

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "path_tracer.h"
+#include "region_sampling.h"
+#include "scene.h"
+#include "variolux/base/progress.h"
+#include "variolux/base/window.h"
+#include "variolux/dump/format.h"
+
+namespace vlx::render {
+
+struct RenderOptions {
+    int width = 512;  ///< of the whole picture, in pixels
+    int height = 512;
+    std::optional<Window> crop;  ///< the part to render; inside the picture
+    std::size_t camera = 0;      ///< index into the scene's cameras
+    int spp = 16;                ///< samples in each pixel, when uniform
+    int replicates = 1;          ///< independent randomisations that share spp; > 1 adds sample.replicate
+    bool hierarchical = false;   ///< METHOD.md, section 3: 1 to 256 samples a pixel as needed
+    HierarchicalOptions refinement;
+    std::uint64_t seed = 0;
+    PathOptions path;
+    DumpCompression compression = DumpCompression::Rle;
+    std::string version;  ///< of the program, for the header
+
+    /// The broken constraint in words, or nothing.
+    std::optional<std::string> validate(const Scene& scene) const;
+};
+
+struct RenderReport {
+    std::uint64_t samples = 0;
+    std::uint64_t nonFinite = 0;    ///< samples whose radiance overflowed: written as 0, counted here
+    double traceSeconds = 0;        ///< wall time of tracing
+    double writeCpuSeconds = 0;     ///< processor time of compressing and writing
+    std::vector<std::uint64_t> refinedCells;  ///< hierarchical: cells refined at each level
+};
+
+/// Renders a scene into a dump. Works in bands of at most 16 rows: one is traced while the ones before are
+/// written, and memory does not grow with the picture's height. A sample depends on (seed, pixel, index)
+/// only: the file is the same, byte for byte, for any number of threads. Throws Error when the file cannot be
+/// written.
+RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, const std::string& path,
+                        const RenderOptions& options, const Progress& progress = {});
+
+}  // namespace vlx::render

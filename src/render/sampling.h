@@ -1,0 +1,114 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "variolux/base/hash.h"
+#include "variolux/base/sobol.h"
+#include "vec.h"
+
+namespace vlx::render {
+
+/// Which pair of random numbers is for what. Every use has a pair of its own in every path, whether the path
+/// uses it or not, so that leaving one effect out changes no other effect's numbers.
+namespace dimension {
+inline constexpr std::uint32_t kPixel = 0;
+inline constexpr std::uint32_t kLens = 1;
+inline constexpr std::uint32_t kOpacity = 2;  ///< seeds the hash of stochastic opacity
+inline constexpr std::uint32_t kFirstBounce = 3;
+inline constexpr std::uint32_t kPerBounce = 4;
+// Added to the bounce's first pair:
+inline constexpr std::uint32_t kDirection = 0;   ///< direction within the sampled lobe
+inline constexpr std::uint32_t kChoice = 1;      ///< x: lobe, y: Russian roulette
+inline constexpr std::uint32_t kLight = 2;       ///< point on the light
+inline constexpr std::uint32_t kLightChoice = 3; ///< x: which light
+
+constexpr std::uint32_t atBounce(int bounce, std::uint32_t use) {
+    return kFirstBounce + static_cast<std::uint32_t>(bounce) * kPerBounce + use;
+}
+}  // namespace dimension
+
+/// The random numbers of one camera sample: pairs of dimensions of Owen-scrambled, shuffled Sobol points.
+/// Stateless: a pair depends on (seed, index, dimension) only.
+class PathSampler {
+  public:
+    /// `seed`: of the pixel; `index`: of the sample in its pixel.
+    PathSampler(std::uint64_t seed, std::uint32_t index) : seed_(seed), reversedIndex_(reverseBits(index)) {}
+
+    Vec2 pair(std::uint32_t dimensionPair) const {
+        const std::uint64_t hash = mixBits(seed_ + dimensionPair * 0x9e3779b97f4a7c15u);
+        const std::uint32_t index = shuffledIndex(reversedIndex_, static_cast<std::uint32_t>(hash));
+        const SobolPoint p = scrambledSobolPoint(index, SobolSeeds::from(mixBits(hash)));
+        return {unitFloat(p.x), unitFloat(p.y)};
+    }
+
+    /// A seed that belongs to this sample alone, for hashed decisions along the path.
+    std::uint32_t hashSeed(std::uint32_t dimensionPair) const {
+        return static_cast<std::uint32_t>(hashOf(seed_, reversedIndex_, dimensionPair));
+    }
+
+  private:
+    std::uint64_t seed_;
+    std::uint32_t reversedIndex_;
+};
+
+/// Uniform square to uniform unit disk, concentric (Shirley, Chiu, 1997).
+inline Vec2 toDisk(Vec2 u) {
+    const float a = 2 * u.x - 1, b = 2 * u.y - 1;
+    if (a == 0 && b == 0) return {0, 0};
+    const bool wide = std::abs(a) > std::abs(b);
+    const float r = wide ? a : b;
+    const float phi = wide ? (kPi / 4) * (b / a) : (kPi / 2) - (kPi / 4) * (a / b);
+    return {r * std::cos(phi), r * std::sin(phi)};
+}
+
+/// Cosine-weighted direction about +z; density cos / pi.
+inline Vec3 cosineHemisphere(Vec2 u) {
+    const Vec2 d = toDisk(u);
+    return {d.x, d.y, std::sqrt(std::max(0.f, 1 - d.x * d.x - d.y * d.y))};
+}
+
+/// Uniform direction in the cone of directions with z >= cosMax; density 1 / (2 pi (1 - cosMax)).
+/// `oneMinusCosMax` is passed as such: it keeps its precision for narrow cones.
+inline Vec3 uniformCone(Vec2 u, float oneMinusCosMax) {
+    const float oneMinusCos = u.x * oneMinusCosMax;
+    const float sinTheta = std::sqrt(std::max(0.f, oneMinusCos * (2 - oneMinusCos)));
+    const float phi = 2 * kPi * u.y;
+    return {sinTheta * std::cos(phi), sinTheta * std::sin(phi), 1 - oneMinusCos};
+}
+
+/// Barycentric coordinates of a uniform point of a triangle (Heitz, "A low-distortion map between triangle
+/// and square", 2019): b1, b2 of the second and third corner.
+inline Vec2 uniformTriangle(Vec2 u) {
+    float b1 = u.x, b2 = u.y;
+    if (b2 > b1) {
+        b1 *= 0.5f;
+        b2 -= b1;
+    } else {
+        b2 *= 0.5f;
+        b1 -= b2;
+    }
+    return {b1, b2};
+}
+
+/// A discrete distribution over n entries with given weights, sampled by its cumulative sums.
+class Distribution {
+  public:
+    Distribution() = default;
+    /// Weights >= 0, finite. When all are zero every entry is equally likely.
+    explicit Distribution(std::span<const float> weights);
+
+    struct Sample {
+        std::size_t index = 0;
+        float probability = 0;
+        float remapped = 0;  ///< where u fell inside the entry's interval: a uniform number again
+    };
+    Sample sample(float u) const;
+    float probability(std::size_t index) const { return cumulative_[index + 1] - cumulative_[index]; }
+    std::size_t size() const { return cumulative_.empty() ? 0 : cumulative_.size() - 1; }
+
+  private:
+    std::vector<float> cumulative_;  ///< size() + 1 values from 0 to 1
+};
+
+}  // namespace vlx::render

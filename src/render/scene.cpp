@@ -1,0 +1,198 @@
+#include "scene.h"
+
+#include "accelerator.h"
+
+namespace vlx::render {
+namespace {
+
+/// Linear interpolation over a triangle.
+template <class T>
+T interpolated(const T& a, const T& b, const T& c, float u, float v) {
+    return a * (1 - u - v) + b * u + c * v;
+}
+
+/// The three entries of an optional vertex array.
+template <class T>
+std::array<const T*, 3> corners(const std::vector<T>& array, std::int64_t first, const Shape& shape,
+                                const std::array<std::uint32_t, 3>& corner) {
+    const T* base = array.data() + first;
+    return {base + (corner[0] - shape.firstVertex), base + (corner[1] - shape.firstVertex),
+            base + (corner[2] - shape.firstVertex)};
+}
+
+Rgba colourAt(const Scene& scene, const Shape& shape, const std::array<std::uint32_t, 3>& corner, float u,
+              float v) {
+    const auto c = corners(scene.colours, shape.firstColour, shape, corner);
+    return {interpolated(c[0]->rgb, c[1]->rgb, c[2]->rgb, u, v),
+            interpolated(c[0]->a, c[1]->a, c[2]->a, u, v)};
+}
+
+/// The normal of the material's normal map in the frame of `normal`. The tangent is the vertices' own or,
+/// without one, the direction in which u grows over the triangle.
+Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& material,
+                  const std::array<std::uint32_t, 3>& corner, float u, float v, const TextureCoordinates& uv,
+                  const Vec3& normal) {
+    Vec3 tangent;
+    float sign = 1;
+    if (shape.firstTangent >= 0) {
+        const auto t = corners(scene.tangents, shape.firstTangent, shape, corner);
+        tangent = interpolated(t[0]->direction, t[1]->direction, t[2]->direction, u, v);
+        sign = t[0]->sign;
+    } else {
+        const auto at = [&](std::size_t i) -> const Vertex& { return scene.vertices[corner[i]]; };
+        std::array<Vec2, 3> st{at(0).uv, at(1).uv, at(2).uv};
+        if (material.normalTexture.uvSet == 1 && shape.firstSecondUv >= 0) {
+            const auto s = corners(scene.secondUvs, shape.firstSecondUv, shape, corner);
+            st = {*s[0], *s[1], *s[2]};
+        }
+        const Vec2 d1 = st[1] - st[0], d2 = st[2] - st[0];
+        const Vec3 e1 = at(1).position - at(0).position, e2 = at(2).position - at(0).position;
+        const float det = d1.x * d2.y - d1.y * d2.x;
+        tangent = (e1 * d2.y - e2 * d1.y) * (det < 0 ? -1.f : 1.f);
+        sign = det < 0 ? 1.f : -1.f;  // v grows downwards in the image, the map's green upwards
+    }
+    tangent = tangent - normal * dot(normal, tangent);
+    const float norm = length(tangent);
+    if (!(norm > 1e-12f)) return normal;
+    tangent = tangent / norm;
+    const Rgb encoded =
+        scene.textures[static_cast<std::size_t>(material.normalTexture.texture)].lookup(uv.of(material.normalTexture)).rgb;
+    const Vec3 local{(2 * encoded.x - 1) * material.normalScale, (2 * encoded.y - 1) * material.normalScale,
+                     2 * encoded.z - 1};
+    const Vec3 mapped = tangent * local.x + cross(normal, tangent) * (sign * local.y) + normal * local.z;
+    const float mappedNorm = length(mapped);
+    return mappedNorm > 1e-6f ? mapped / mappedNorm : normal;
+}
+
+/// A shading normal turned just so far towards the viewer that it faces him: interpolated and mapped normals
+/// may not.
+Vec3 facing(const Vec3& normal, const Vec3& toViewer) {
+    constexpr float kLeast = 1e-3f;
+    const float cosine = dot(normal, toViewer);
+    return cosine >= kLeast ? normal : normalized(normal + toViewer * (kLeast - cosine));
+}
+
+}  // namespace
+
+std::uint64_t Scene::triangleCount() const {
+    std::uint64_t count = 0;
+    for (std::uint32_t i = 0; i < worldShapes; ++i) count += shapes[i].triangles;
+    for (const Instance& instance : instances) {
+        const Group& group = groups[instance.group];
+        for (std::uint32_t i = 0; i < group.shapes; ++i) count += shapes[group.firstShape + i].triangles;
+    }
+    return count;
+}
+
+TextureCoordinates textureCoordinates(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u,
+                                      float v) {
+    const auto& corner = scene.triangles[triangle];
+    TextureCoordinates uv;
+    uv.first = interpolated(scene.vertices[corner[0]].uv, scene.vertices[corner[1]].uv,
+                            scene.vertices[corner[2]].uv, u, v);
+    uv.second = uv.first;
+    if (shape.firstSecondUv >= 0) {
+        const auto s = corners(scene.secondUvs, shape.firstSecondUv, shape, corner);
+        uv.second = interpolated(*s[0], *s[1], *s[2], u, v);
+    }
+    return uv;
+}
+
+float opacityAt(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v) {
+    const Material& material = scene.materials[shape.material];
+    if (material.alphaMode == AlphaMode::Opaque) return 1;
+    float opacity = material.opacity;
+    if (material.baseColourTexture) {
+        const TextureCoordinates uv = textureCoordinates(scene, shape, triangle, u, v);
+        opacity *= scene.textures[static_cast<std::size_t>(material.baseColourTexture.texture)]
+                       .lookup(uv.of(material.baseColourTexture))
+                       .a;
+    }
+    if (shape.firstColour >= 0) opacity *= colourAt(scene, shape, scene.triangles[triangle], u, v).a;
+    if (material.alphaMode == AlphaMode::Mask) return opacity >= material.alphaCutoff ? 1 : 0;
+    return opacity;
+}
+
+Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v,
+                    float cosTheta) {
+    const Material& material = scene.materials[shape.material];
+    Rgb emission = material.emission;
+    if (material.emissionTexture) {
+        const TextureCoordinates uv = textureCoordinates(scene, shape, triangle, u, v);
+        emission *= scene.textures[static_cast<std::size_t>(material.emissionTexture.texture)]
+                        .lookup(uv.of(material.emissionTexture))
+                        .rgb;
+    }
+    if (material.clearcoat > 0)
+        emission *= 1 - material.clearcoat * (0.04f + 0.96f * schlickWeight(cosTheta));
+    return emission;
+}
+
+SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirection) {
+    const Shape& shape = scene.shapes[hit.shape];
+    SurfacePoint p;
+    p.shape = &shape;
+    p.material = &scene.materials[shape.material];
+    p.triangle = shape.firstTriangle + hit.triangle;
+    const auto& corner = scene.triangles[p.triangle];
+    const Vertex& a = scene.vertices[corner[0]];
+    const Vertex& b = scene.vertices[corner[1]];
+    const Vertex& c = scene.vertices[corner[2]];
+    const float w = 1 - hit.u - hit.v;
+
+    p.position = a.position * w + b.position * hit.u + c.position * hit.v;
+    Vec3 geometric = cross(b.position - a.position, c.position - a.position);
+    Vec3 shading = a.normal * w + b.normal * hit.u + c.normal * hit.v;
+    p.uv = textureCoordinates(scene, shape, p.triangle, hit.u, hit.v);
+    if (p.material->normalTexture)
+        shading = mappedNormal(scene, shape, *p.material, corner, hit.u, hit.v, p.uv, normalized(shading));
+    if (shape.firstColour >= 0) p.colour = colourAt(scene, shape, corner, hit.u, hit.v).rgb;
+    if (hit.instance >= 0) {
+        const Transform& toWorld = scene.instances[static_cast<std::size_t>(hit.instance)].toWorld;
+        p.position = toWorld.point(p.position);
+        geometric = toWorld.normal(geometric);
+        shading = toWorld.normal(shading);
+    }
+    geometric = normalized(geometric);
+    // Vertex normals that cancel out, or point away from the triangle's own front, are no use.
+    const float norm = length(shading);
+    shading = norm > 1e-12f ? shading / norm : geometric;
+    if (dot(shading, geometric) < 0) shading = -shading;
+
+    p.fromBehind = dot(geometric, rayDirection) > 0;
+    p.geometricNormal = p.fromBehind ? -geometric : geometric;
+    p.shadingNormal = facing(p.fromBehind ? -shading : shading, -rayDirection);
+    return p;
+}
+
+SurfaceParameters surfaceParameters(const Scene& scene, const SurfacePoint& point) {
+    const Material& m = *point.material;
+    const auto sampled = [&](const TextureRef& ref) {
+        return scene.textures[static_cast<std::size_t>(ref.texture)].lookup(point.uv.of(ref));
+    };
+    SurfaceParameters s;
+    s.baseColour = m.baseColour * point.colour;
+    if (m.baseColourTexture) s.baseColour *= sampled(m.baseColourTexture).rgb;
+    s.metallic = m.metallic;
+    s.roughness = m.roughness;
+    if (m.metallicRoughnessTexture) {
+        const Rgb t = sampled(m.metallicRoughnessTexture).rgb;
+        s.roughness *= t.y;
+        s.metallic *= t.z;
+    }
+    s.ior = m.ior;
+    s.specular = m.specular;
+    if (m.specularTexture) s.specular *= sampled(m.specularTexture).a;
+    s.specularColour = m.specularColour;
+    if (m.specularColourTexture) s.specularColour *= sampled(m.specularColourTexture).rgb;
+    s.transmission = m.transmission;
+    if (m.transmissionTexture) s.transmission *= sampled(m.transmissionTexture).rgb.x;
+    s.clearcoat = m.clearcoat;
+    if (m.clearcoatTexture) s.clearcoat *= sampled(m.clearcoatTexture).rgb.x;
+    s.clearcoatRoughness = m.clearcoatRoughness;
+    if (m.clearcoatRoughnessTexture) s.clearcoatRoughness *= sampled(m.clearcoatRoughnessTexture).rgb.y;
+    if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
+    return s;
+}
+
+}  // namespace vlx::render

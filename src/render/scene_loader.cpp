@@ -1,0 +1,309 @@
+#include "scene_loader.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "gltf_file.h"
+#include "gltf_geometry.h"
+#include "gltf_material.h"
+#include "variolux/base/error.h"
+
+namespace vlx::render {
+namespace {
+
+/// Singular or not finite: meshes and lights there have no place.
+bool usable(const Transform& t) {
+    for (const auto& row : t.m)
+        for (const double v : row)
+            if (!std::isfinite(v)) return false;
+    return std::abs(t.determinant()) > 0;
+}
+
+Transform localTransform(const GltfFile& file, const tinygltf::Node& node, const std::string& what) {
+    Transform t;
+    if (node.matrix.size() == 16) {
+        for (std::size_t i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 4; ++j) t.m[i][j] = node.matrix[j * 4 + i];
+    } else {
+        std::array<double, 4> q{0, 0, 0, 1};
+        if (node.rotation.size() == 4) std::copy(node.rotation.begin(), node.rotation.end(), q.begin());
+        const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        if (!(norm > 0)) file.fail(what + " has a rotation that is no quaternion");
+        const double x = q[0] / norm, y = q[1] / norm, z = q[2] / norm, w = q[3] / norm;
+        t.m = {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), 0},
+                {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), 0},
+                {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), 0}}};
+        for (std::size_t i = 0; i < 3; ++i) {
+            if (node.scale.size() == 3)
+                for (std::size_t j = 0; j < 3; ++j) t.m[i][j] *= node.scale[j];
+            if (node.translation.size() == 3) t.m[i][3] = node.translation[i];
+        }
+    }
+    for (const auto& row : t.m)
+        for (const double v : row)
+            if (!std::isfinite(v)) file.fail(what + " has a transform that is not finite");
+    return t;
+}
+
+/// Rotation and translation of a transform: cameras do not scale.
+std::optional<Transform> rigid(const Transform& t) {
+    Transform r = t;
+    for (std::size_t j = 0; j < 3; ++j) {
+        const double norm = std::sqrt(t.m[0][j] * t.m[0][j] + t.m[1][j] * t.m[1][j] + t.m[2][j] * t.m[2][j]);
+        if (!(norm > 0) || !std::isfinite(norm)) return std::nullopt;
+        for (std::size_t i = 0; i < 3; ++i) r.m[i][j] = t.m[i][j] / norm;
+    }
+    return r;
+}
+
+class Loader {
+  public:
+    explicit Loader(const std::string& path) : file_(path), model_(file_.model()), geometry_(file_, scene_) {
+        scene_.name = path.substr(path.find_last_of('/') + 1);
+    }
+
+    Scene load(const EnvironmentOptions& environment) {
+        checkExtensions();
+        readMaterials();
+        readNodes();
+        readEnvironment(environment);
+        if (scene_.cameras.empty()) file_.fail("has no camera");
+        if (scene_.shapes.empty() && !scene_.environment) file_.fail("has no triangles and no environment");
+        completeScene(scene_);
+        if (scene_.lights.empty())
+            file_.fail(
+                "has no light: neither punctual lights nor emissive surfaces nor an environment (give one with "
+                "--env-constant or --env)");
+        return std::move(scene_);
+    }
+
+  private:
+    struct Placed {
+        std::size_t node;
+        Transform toWorld;
+    };
+
+    void warn(const std::string& text) { scene_.report.warnings.push_back(text); }
+
+    void checkExtensions() {
+        static const std::set<std::string> known = {
+            "KHR_lights_punctual",      "KHR_texture_transform",  "KHR_mesh_quantization",
+            "KHR_materials_ior",        "KHR_materials_specular", "KHR_materials_emissive_strength",
+            "KHR_materials_clearcoat", "KHR_materials_transmission"};
+        for (const std::string& name : model_.extensionsRequired)
+            if (!known.contains(name)) file_.fail("requires the extension " + name + ", which is not supported");
+        for (const std::string& name : model_.extensionsUsed)
+            if (!known.contains(name)) warn("the extension " + name + " is ignored");
+        if (!model_.animations.empty()) warn("animations are left at rest");
+        if (!model_.skins.empty()) warn("skins are left at rest");
+    }
+
+    void readMaterials() {
+        MaterialReader reader(file_, scene_.textures);
+        for (std::size_t i = 0; i < model_.materials.size(); ++i)
+            scene_.materials.push_back(reader.read(model_.materials[i], i));
+        scene_.materials.emplace_back();  // the specification's default material
+    }
+
+    /// All nodes of the scene with their places, in the order of the file's trees.
+    std::vector<Placed> placedNodes() {
+        std::vector<int> roots;
+        if (!model_.scenes.empty()) {
+            const int which = model_.defaultScene >= 0 ? model_.defaultScene : 0;
+            if (static_cast<std::size_t>(which) >= model_.scenes.size())
+                file_.fail("refers to scene " + std::to_string(which) + ", it has " +
+                           std::to_string(model_.scenes.size()));
+            roots = model_.scenes[static_cast<std::size_t>(which)].nodes;
+            sceneExtras_ = model_.scenes[static_cast<std::size_t>(which)].extras;
+        }
+        struct Pending {
+            int node;
+            Transform parent;
+        };
+        std::vector<Pending> stack;
+        std::vector<char> visited(model_.nodes.size(), 0);
+        std::vector<Placed> placed;
+        for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}});
+        while (!stack.empty()) {
+            const Pending next = stack.back();
+            stack.pop_back();
+            if (next.node < 0 || static_cast<std::size_t>(next.node) >= model_.nodes.size())
+                file_.fail("refers to node " + std::to_string(next.node) + ", it has " +
+                           std::to_string(model_.nodes.size()));
+            const auto index = static_cast<std::size_t>(next.node);
+            const tinygltf::Node& node = model_.nodes[index];
+            if (visited[index]++) file_.fail(described("node", index, node.name) + " has more than one parent");
+            const Transform toWorld = next.parent * localTransform(file_, node, described("node", index, node.name));
+            placed.push_back({index, toWorld});
+            for (auto c = node.children.rbegin(); c != node.children.rend(); ++c) stack.push_back({*c, toWorld});
+        }
+        return placed;
+    }
+
+    void readNodes() {
+        const std::vector<Placed> placed = placedNodes();
+        std::map<std::size_t, std::vector<Transform>> uses;  // mesh -> where
+        std::vector<std::size_t> order;
+        for (const auto& [index, toWorld] : placed) {
+            const tinygltf::Node& node = model_.nodes[index];
+            const std::string what = described("node", index, node.name);
+            if (node.camera >= 0) readCamera(node, toWorld, what);
+            if (const auto* light = extension(node.extensions, "KHR_lights_punctual"))
+                readLight(static_cast<int>(number(*light, "light", -1)), node, toWorld, what);
+            if (node.mesh < 0) continue;
+            const auto mesh = static_cast<std::size_t>(node.mesh);
+            if (mesh >= model_.meshes.size())
+                file_.fail(what + " refers to mesh " + std::to_string(mesh) + ", the file has " +
+                           std::to_string(model_.meshes.size()));
+            if (!usable(toWorld)) {
+                warn(what + " has a transform without an inverse: its mesh is left out");
+                continue;
+            }
+            if (uses[mesh].empty()) order.push_back(mesh);
+            uses[mesh].push_back(toWorld);
+        }
+        // Shapes of groups come after all others: group them at the end.
+        std::vector<std::vector<Shape>> groups;
+        for (const std::size_t mesh : order) {
+            const auto& places = uses[mesh];
+            if (places.size() == 1 || emissive(mesh)) {
+                for (const Transform& toWorld : places) {
+                    const auto shapes = geometry_.read(mesh, toWorld);
+                    scene_.shapes.insert(scene_.shapes.end(), shapes.begin(), shapes.end());
+                }
+                continue;
+            }
+            auto shapes = geometry_.read(mesh, {});
+            if (shapes.empty()) continue;
+            const auto group = static_cast<std::uint32_t>(groups.size());
+            groups.push_back(std::move(shapes));
+            for (const Transform& toWorld : places) scene_.instances.push_back({group, toWorld});
+        }
+        scene_.worldShapes = static_cast<std::uint32_t>(scene_.shapes.size());
+        for (const auto& shapes : groups) {
+            scene_.groups.push_back({static_cast<std::uint32_t>(scene_.shapes.size()),
+                                     static_cast<std::uint32_t>(shapes.size())});
+            scene_.shapes.insert(scene_.shapes.end(), shapes.begin(), shapes.end());
+        }
+    }
+
+    bool emissive(std::size_t mesh) const {
+        return std::ranges::any_of(model_.meshes[mesh].primitives, [&](const tinygltf::Primitive& p) {
+            return p.material >= 0 && static_cast<std::size_t>(p.material) < scene_.materials.size() &&
+                   scene_.materials[static_cast<std::size_t>(p.material)].emissive();
+        });
+    }
+
+    void readCamera(const tinygltf::Node& node, const Transform& toWorld, const std::string& what) {
+        const auto index = static_cast<std::size_t>(node.camera);
+        if (index >= model_.cameras.size())
+            file_.fail(what + " refers to camera " + std::to_string(index) + ", the file has " +
+                       std::to_string(model_.cameras.size()));
+        const tinygltf::Camera& source = model_.cameras[index];
+        Camera camera;
+        camera.name = node.name.empty() ? source.name : node.name;
+        if (const auto place = rigid(toWorld)) {
+            camera.toWorld = *place;
+        } else {
+            camera.unusable = "its transform has no inverse";
+        }
+        camera.verticalFov = static_cast<float>(source.perspective.yfov);
+        camera.aspect = static_cast<float>(source.perspective.aspectRatio);
+        if (source.type != "perspective") camera.unusable = "it is not a perspective camera";
+        else if (!(camera.verticalFov > 0 && camera.verticalFov < kPi))
+            camera.unusable = "its yfov is " + std::to_string(camera.verticalFov) + ", expected between 0 and pi";
+        if (!(camera.aspect > 0 && camera.aspect < 1e6f)) camera.aspect = 0;
+        const auto extra = [&](const char* key) {
+            return number(node.extras, key, number(source.extras, key, 0));
+        };
+        camera.lensRadius = static_cast<float>(extra("lens_radius"));
+        camera.focusDistance = static_cast<float>(extra("focus_distance"));
+        if (camera.lensRadius > 0 && !(camera.focusDistance > 0))
+            camera.unusable = "it has a lens_radius but no positive focus_distance";
+        if (extra("active") != 0 && !activeSeen_) {
+            scene_.activeCamera = scene_.cameras.size();
+            activeSeen_ = true;
+        }
+        scene_.cameras.push_back(std::move(camera));
+    }
+
+    void readLight(int index, const tinygltf::Node& node, const Transform& toWorld, const std::string& what) {
+        if (index < 0 || static_cast<std::size_t>(index) >= model_.lights.size())
+            file_.fail(what + " refers to light " + std::to_string(index) + ", the file has " +
+                       std::to_string(model_.lights.size()));
+        const tinygltf::Light& source = model_.lights[static_cast<std::size_t>(index)];
+        Light light;
+        light.name = node.name.empty() ? source.name : node.name;
+        Rgb colour{1, 1, 1};
+        if (source.color.size() == 3)
+            colour = {static_cast<float>(source.color[0]), static_cast<float>(source.color[1]),
+                      static_cast<float>(source.color[2])};
+        light.intensity = colour * static_cast<float>(source.intensity);
+        if (!isFinite(light.intensity) || light.intensity.x < 0 || light.intensity.y < 0 || light.intensity.z < 0)
+            file_.fail(what + ": the light's intensity must be finite and >= 0");
+        if (isBlack(light.intensity)) {
+            warn(what + ": the light has no power");
+            return;
+        }
+        light.position = toWorld.point({0, 0, 0});
+        const Vec3 axis = toWorld.vector({0, 0, -1});
+        const bool directed = source.type != "point";
+        if (directed && !(length(axis) > 0)) file_.fail(what + ": the light has no direction");
+        light.direction = directed ? normalized(axis) : Vec3{0, 0, -1};
+        const double radius = number(node.extras, "radius", number(source.extras, "radius", 0));
+        if (source.type == "directional") {
+            light.type = LightType::Directional;
+        } else if (source.type == "point" || source.type == "spot") {
+            light.type = radius > 0   ? LightType::Sphere
+                         : directed ? LightType::Spot
+                                    : LightType::Point;
+            light.radius = static_cast<float>(std::max(0.0, radius));
+            if (directed) {
+                const double inner = std::cos(source.spot.innerConeAngle);
+                const double outer = std::cos(source.spot.outerConeAngle);
+                const double scale = 1 / std::max(0.001, inner - outer);
+                light.coneScale = static_cast<float>(scale);
+                light.coneOffset = static_cast<float>(-outer * scale);
+            }
+        } else {
+            file_.fail(what + ": the light's type is '" + source.type + "', expected point, spot or directional");
+        }
+        scene_.lights.push_back(std::move(light));
+    }
+
+    void readEnvironment(const EnvironmentOptions& options) {
+        if (options.constant) {
+            scene_.environment = Environment(*options.constant);
+        } else if (!options.image.empty()) {
+            scene_.environment = loadEnvironment(options.image);
+        } else if (sceneExtras_.IsObject() && sceneExtras_.Has("env_constant")) {
+            const tinygltf::Value& v = sceneExtras_.Get("env_constant");
+            const bool triple = v.IsArray() && v.ArrayLen() == 3 && v.Get(0).IsNumber() && v.Get(1).IsNumber() &&
+                                v.Get(2).IsNumber();
+            if (!triple) file_.fail("the scene's env_constant must be three numbers");
+            const auto at = [&](int i) { return static_cast<float>(v.Get(i).GetNumberAsDouble()); };
+            const Rgb radiance{at(0), at(1), at(2)};
+            if (!isFinite(radiance) || radiance.x < 0 || radiance.y < 0 || radiance.z < 0)
+                file_.fail("the scene's env_constant must be finite and >= 0");
+            if (!isBlack(radiance)) scene_.environment = Environment(radiance);
+        } else if (sceneExtras_.IsObject() && sceneExtras_.Has("envmap")) {
+            warn("the scene names an environment image; give it with --env");
+        }
+    }
+
+    GltfFile file_;
+    const tinygltf::Model& model_;
+    Scene scene_;
+    GeometryReader geometry_;
+    tinygltf::Value sceneExtras_;
+    bool activeSeen_ = false;
+};
+
+}  // namespace
+
+Scene loadScene(const std::string& path, const EnvironmentOptions& environment) {
+    return Loader(path).load(environment);
+}
+
+}  // namespace vlx::render

@@ -1,0 +1,195 @@
+// vlx-trace: traces a glTF scene into a dump of samples.
+
+#include <array>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "progress_bar.h"
+#include "render.h"
+#include "scene_loader.h"
+#include "tool_main.h"
+#include "variolux/base/error.h"
+#include "variolux/base/parallel.h"
+
+namespace {
+
+using namespace vlx::render;
+
+struct TraceCommand {
+    std::string scene;
+    std::string dump;
+    std::string camera;
+    int width = 0;
+    int height = 0;
+    std::vector<int> crop;
+    std::vector<float> environmentConstant;
+    EnvironmentOptions environment;
+    int threads = 0;
+    bool listCameras = false;
+    bool json = false;
+    RenderOptions options;
+
+    void bind(CLI::App& app) {
+        app.footer(
+            "Examples:\n"
+            "  vlx-trace room.glb -o room.exr --width 640 --spp 32\n"
+            "  vlx-trace room.glb -o room.exr --hierarchical --tolerance 0.05 --seed 7\n"
+            "  vlx-trace house.gltf -o house.exr --env sky.exr --camera kitchen --crop 100,50,64,64\n"
+            "The dump is a deep OpenEXR file: its part `beauty` is the plain average, its part `samples` holds\n"
+            "every sample with position, albedo, normal and depth. vlx-krige reconstructs it.");
+        app.add_option("SCENE", scene, "A glTF 2.0 scene, .glb or .gltf")->required();
+        app.add_option("-o,--output", dump, "The dump to write (.exr)");
+        app.add_option("--camera", camera, "Name or number of the camera (default: the scene's active one)")
+            ->type_name("NAME|INDEX");
+        app.add_flag("--list-cameras", listCameras, "Print the scene's cameras and exit");
+        app.add_option("--width", width, "Of the picture, in pixels (default: 512, or from the height)")
+            ->check(CLI::Range(1, 1 << 20));
+        app.add_option("--height", height, "Of the picture (default: from the width, by the camera's aspect)")
+            ->check(CLI::Range(1, 1 << 20));
+        app.add_option("--crop", crop, "Render only this part of the picture")
+            ->delimiter(',')
+            ->expected(4)
+            ->type_name("X,Y,WIDTH,HEIGHT");
+        auto* spp = app.add_option("--spp", options.spp, "Samples a pixel, the same everywhere")
+                        ->check(CLI::Range(1, 1 << 24))
+                        ->capture_default_str();
+        auto* hierarchical =
+            app.add_flag("--hierarchical", options.hierarchical,
+                         "Sample cells of 4, 2, 1, 1/2, 1/4 pixels in turn, as long as their residual\n"
+                         "variance asks for it: 1 to 256 samples a pixel")
+                ->excludes(spp);
+        app.add_option("--tolerance", options.refinement.tolerance,
+                       "Hierarchical: the relative standard error of a pixel at which its cells are\n"
+                       "no longer refined; 0 takes all 256 samples")
+            ->check(CLI::NonNegativeNumber)
+            ->needs(hierarchical)
+            ->capture_default_str();
+        app.add_option("--replicates", options.replicates,
+                       "Divide the samples of each pixel into this many independent randomisations\n"
+                       "(written as sample.replicate)")
+            ->check(CLI::PositiveNumber)
+            ->excludes(hierarchical)
+            ->capture_default_str();
+        app.add_option("--seed", options.seed, "Another seed, other noise")->capture_default_str();
+        app.add_option("--max-bounces", options.path.maxBounces, "Scattering events of a path at most")
+            ->check(CLI::Range(0, 1 << 16))
+            ->capture_default_str();
+        auto* constant = app.add_option("--env-constant", environmentConstant,
+                                        "Radiance from all around, in place of the scene's own environment")
+                             ->delimiter(',')
+                             ->expected(3)
+                             ->check(CLI::NonNegativeNumber)
+                             ->type_name("R,G,B");
+        app.add_option("--env", environment.image,
+                       "Latitude-longitude image of the environment (EXR, HDR, ...); its middle is -z")
+            ->excludes(constant);
+        app.add_option("--threads", threads, "0: all processors. The result does not depend on it")
+            ->check(CLI::Range(0, 4096))
+            ->capture_default_str();
+        using enum vlx::DumpCompression;
+        vlx::addChoice(app, "--compression", options.compression, {{"none", None}, {"rle", Rle}, {"zips", Zips}},
+                       "Of the dump. rle: hardly slows tracing down; zips: a fifth smaller");
+        app.add_flag("--json", json, "Print what was done as JSON on standard output");
+    }
+
+    int run() {
+        if (dump.empty() && !listCameras) throw CLI::RequiredError("--output");
+        if (environmentConstant.size() == 3)
+            environment.constant = Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
+        const vlx::ThreadLimit limit(threads);
+        const Scene loaded = loadScene(scene, environment);
+        if (listCameras) return printCameras(loaded);
+        options.camera = chosenCamera(loaded);
+        setSize(loaded.cameras[options.camera]);
+        if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
+        options.version = VARIOLUX_VERSION;
+        if (const auto broken = options.validate(loaded)) throw CLI::ValidationError(*broken);
+        for (const std::string& warning : loaded.report.warnings) note("warning: " + warning);
+        if (loaded.report.degenerateTriangles > 0)
+            note(std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");
+
+        const Accelerator accelerator(loaded);
+        RenderReport report;
+        {
+            vlx::ProgressBar bar("tracing");
+            report = renderDump(loaded, accelerator, dump, options, bar);
+        }
+        if (report.nonFinite > 0)
+            note("warning: " + std::to_string(report.nonFinite) + " samples overflowed and were written as black");
+        summarize(loaded, report);
+        return vlx::kDone;
+    }
+
+  private:
+    void note(const std::string& text) const { std::fprintf(stderr, "%s: %s\n", scene.c_str(), text.c_str()); }
+
+    int printCameras(const Scene& loaded) const {
+        for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
+            const Camera& c = loaded.cameras[i];
+            std::cout << i << "  " << c.name << (i == loaded.activeCamera ? "  (active)" : "")
+                      << (c.unusable.empty() ? "" : "  unusable: " + c.unusable) << "\n";
+        }
+        return vlx::kDone;
+    }
+
+    std::size_t chosenCamera(const Scene& loaded) const {
+        if (camera.empty()) return loaded.activeCamera;
+        for (std::size_t i = 0; i < loaded.cameras.size(); ++i)
+            if (loaded.cameras[i].name == camera) return i;
+        const bool isNumber = camera.find_first_not_of("0123456789") == std::string::npos && camera.size() < 9;
+        if (isNumber && std::stoul(camera) < loaded.cameras.size()) return std::stoul(camera);
+        std::string names;
+        for (const Camera& c : loaded.cameras) names += (names.empty() ? "'" : ", '") + c.name + "'";
+        throw vlx::Error(scene, "has no camera '" + camera + "'; it has " + names);
+    }
+
+    void setSize(const Camera& chosen) {
+        const double aspect = chosen.aspect > 0 ? static_cast<double>(chosen.aspect) : 1.0;
+        const auto rounded = [](double v) { return std::max(1, static_cast<int>(std::lround(v))); };
+        if (width == 0) width = height == 0 ? 512 : rounded(height * aspect);
+        if (height == 0) height = rounded(width / aspect);
+        options.width = width;
+        options.height = height;
+    }
+
+    void summarize(const Scene& loaded, const RenderReport& report) const {
+        const double seconds = report.traceSeconds;
+        const double rate = seconds > 0 ? static_cast<double>(report.samples) / seconds * 1e-6 : 0;
+        const double cpu = seconds * vlx::threadCount();
+        const double share = cpu > 0 ? report.writeCpuSeconds / cpu : 0;
+        if (json) {
+            nlohmann::ordered_json j{{"scene", scene},
+                                     {"dump", dump},
+                                     {"camera", loaded.cameras[options.camera].name},
+                                     {"width", options.width},
+                                     {"height", options.height},
+                                     {"triangles", loaded.triangleCount()},
+                                     {"lights", loaded.lights.size()},
+                                     {"samples", report.samples},
+                                     {"nonFinite", report.nonFinite},
+                                     {"degenerateTriangles", loaded.report.degenerateTriangles},
+                                     {"threads", vlx::threadCount()},
+                                     {"traceSeconds", seconds},
+                                     {"megasamplesPerSecond", rate},
+                                     {"writeCpuSeconds", report.writeCpuSeconds},
+                                     {"warnings", loaded.report.warnings}};
+            if (options.hierarchical) j["refinedCells"] = report.refinedCells;
+            std::cout << j.dump(2) << "\n";
+        }
+        std::fprintf(stderr,
+                     "%s: %llu samples in %.2f s (%.3f Msamples/s, %d threads); compressing and writing took "
+                     "%.2f processor seconds (%.1f %% of tracing)\n",
+                     dump.c_str(), static_cast<unsigned long long>(report.samples), seconds, rate,
+                     vlx::threadCount(), report.writeCpuSeconds, 100 * share);
+    }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Trace a glTF scene by path tracing into a dump of samples.", "vlx-trace");
+    TraceCommand command;
+    command.bind(app);
+    return vlx::runTool(argc, argv, app, [&] { return command.run(); });
+}
