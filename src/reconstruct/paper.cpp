@@ -229,8 +229,8 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
         return estimate;
     }
 
-    const double deviation = std::sqrt(moments.spread.sum());
-    const double k = options.colourDistance && deviation > 0 ? 1 / deviation : 0;
+    const double spread = moments.spread.sum();
+    const double k = options.colourDistance && spread > 0 ? moments.signal / spread / std::sqrt(spread) : 0;
     diagnostics.colourScale = k;
     const Eigen::MatrixXd differences = data.means.leftCols(kColours).rowwise() - moments.mean.head(kColours);
 

@@ -10,7 +10,7 @@ namespace vlx {
 namespace {
 
 int cellAlong(double position, int pixel, int cells) {
-    return std::clamp(static_cast<int>(std::floor((position - pixel) * cells)), 0, cells - 1);
+    return static_cast<int>(std::clamp(std::floor((position - pixel) * cells), 0.0, cells - 1.0));
 }
 
 /// Sums over square groups of cells, 2^level cells wide, of a region's grid.

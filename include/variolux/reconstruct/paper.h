@@ -41,12 +41,12 @@ struct RegionEstimate {
 /// 2. A stable model gamma(h) = c0 + c (1 - exp(-(h/r)^alpha)) is fitted to it in classes of
 ///    distance on the image plane.
 /// 3. Composite distance (section 6): h^2 = dx^2 + dy^2 + k^2 |dz|^2 with dz the difference of two RGB
-/// estimates, each
-///    taken from the region's arithmetic mean m. A datum's estimate is its mean; a target's is its pixel's
-///    arithmetic mean, drawn towards m by how much of it is noise: m + (pixel mean - m) S / (S + e), with S
-///    the variance between the region's data less their errors, e the error variance of the pixel mean. k
-///    makes one standard deviation of the region's data as long as one pixel: a singular value, many
-///    deviations away from all others, loses its weight.
+///    estimates, each taken from the region's arithmetic mean m. A datum's estimate is its mean; a target's
+///    is its pixel's arithmetic mean, drawn towards m by how much of it is noise: m + (pixel mean - m) S /
+///    (S + e), with S the variance between the region's data less their errors, e the error variance of the
+///    pixel mean. k makes one standard deviation of the region's data as long as one pixel, times the share
+///    of their variance that is no noise, S / variance: noise alone does not make neighbours distant; a
+///    singular value, many deviations away from all others, loses its weight.
 /// 4. The system (11), in covariance form (the errors with a plus on the diagonal of the covariances), is
 ///    factorised once; a pixel's estimate is the mean over its cells of the kriged field (a block target).
 ///    The nugget is variation between cells that is no noise: a pixel contains that of its own cells.

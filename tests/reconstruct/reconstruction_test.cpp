@@ -1,0 +1,181 @@
+#include "variolux/reconstruct/reconstruction.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "../base/temporary_folder.h"
+#include "make_band.h"
+#include "variolux/base/error.h"
+#include "variolux/base/parallel.h"
+#include "variolux/dump/writer.h"
+#include "variolux/reconstruct/mean.h"
+#include "variolux/reconstruct/paper.h"
+
+namespace vlx {
+namespace {
+
+DumpHeader headerFor(const SampleBand& band) {
+    DumpHeader header;
+    header.data = header.display = {band.x, band.y, band.width, band.height};
+    for (const std::string& channel : band.channels) header.channels.push_back({channel, ChannelType::Float});
+    return header;
+}
+
+void writeDump(const std::string& path, const SampleBand& band) {
+    DumpWriter writer(path, headerFor(band));
+    writer.write(band);
+    writer.close();
+}
+
+/// A noisy image with an edge, on a window that does not fit the regions.
+SampleBand noisyEdge(const Window& window, int count) {
+    std::mt19937 random(3);
+    std::gamma_distribution<float> noise(2, 0.5f);
+    return makeBand(window, count, [&](int column, int row, int i) {
+        const float z = (column + row > 14 ? 1.0f : 0.1f) * noise(random);
+        return MadeSample{z, 0.7f * z, 0.2f, stratumX(column, i), stratumY(row, i)};
+    });
+}
+
+TEST(ReconstructPaper, SamePixelsForAnyNumberOfThreads) {
+    const TemporaryFolder folder;
+    writeDump(folder / "a.exr", noisyEdge({-3, 5, 38, 27}, 8));
+    Image first;
+    for (const int threads : {1, 2, 8}) {
+        const ThreadLimit limit(threads);
+        const Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
+        if (threads == 1) first = result.image;
+        EXPECT_EQ(result.image.pixels, first.pixels) << threads;
+        EXPECT_EQ(result.image.data, (Window{-3, 5, 38, 27}));
+    }
+}
+
+TEST(ReconstructPaper, RegionsLieOnTheRasterGrid) {
+    const TemporaryFolder folder;
+    writeDump(folder / "a.exr", noisyEdge({-3, 5, 9, 7}, 4));
+    const Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
+    ASSERT_EQ(result.regions.size(), 6u);
+    EXPECT_EQ(result.regions[0].pixels, (Window{-3, 5, 3, 3}));
+    EXPECT_EQ(result.regions[4].pixels, (Window{0, 8, 4, 4}));
+    std::int64_t covered = 0;
+    for (const RegionDiagnostics& region : result.regions) covered += region.pixels.pixels();
+    EXPECT_EQ(covered, 63);
+}
+
+TEST(ReconstructPaper, BeatsTheMeanOnANoisyEdge) {
+    const TemporaryFolder folder;
+    const Window window{0, 0, 32, 32};
+    writeDump(folder / "a.exr", noisyEdge(window, 16));
+    const DumpReader dump(folder / "a.exr");
+    const auto squareError = [&](const Image& image) {
+        double sum = 0;
+        for (int row = 0; row < 32; ++row)
+            for (int col = 0; col < 32; ++col) {
+                const double error =
+                    static_cast<double>(image.at(col, row)[0]) - (col + row > 14 ? 1.0 : 0.1);
+                sum += error * error;
+            }
+        return sum;
+    };
+    EXPECT_LT(squareError(reconstructPaper(dump, {}).image), 0.5 * squareError(reconstructMean(dump).image));
+}
+
+TEST(ReconstructPaper, NeedsNeitherPositionsNorFeaturesNorAlpha) {
+    const TemporaryFolder folder;
+    SampleBand band = noisyEdge({0, 0, 10, 6}, 4);
+    band.channels.resize(3);
+    band.values.resize(3);
+    writeDump(folder / "a.exr", band);
+    const Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
+    EXPECT_EQ(result.image.channels,
+              (std::vector<std::string>{"R", "G", "B", "stddev.R", "stddev.G", "stddev.B"}));
+    for (const float value : result.image.pixels) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(ReconstructPaper, BadSamplesAndEmptyPixelsAreCountedAndTheImageStaysFinite) {
+    const TemporaryFolder folder;
+    SampleBand band = noisyEdge({0, 0, 8, 8}, 2);
+    band.values[1][17] = std::numeric_limits<float>::quiet_NaN();
+    band.values[0][40] = std::numeric_limits<float>::infinity();
+    // Pixels of the top left region lose their samples.
+    SampleBand sparse = band;
+    for (auto& values : sparse.values) values.clear();
+    sparse.offsets = {0};
+    for (int p = 0; p < 64; ++p) {
+        if (p % 8 >= 4 || p / 8 >= 4)
+            for (std::size_t c = 0; c < band.values.size(); ++c)
+                for (std::uint64_t s = band.offsets[static_cast<std::size_t>(p)];
+                     s < band.offsets[static_cast<std::size_t>(p) + 1]; ++s)
+                    sparse.values[c].push_back(band.values[c][s]);
+        sparse.offsets.push_back(sparse.values[0].size());
+    }
+    writeDump(folder / "a.exr", sparse);
+    const DumpReader dump(folder / "a.exr");
+    for (const Reconstruction& result : {reconstructPaper(dump, {}), reconstructMean(dump)}) {
+        EXPECT_EQ(result.report.samples, 96);
+        EXPECT_EQ(result.report.droppedSamples, 1);  // the NaN was in a pixel that was emptied
+        EXPECT_EQ(result.report.emptyPixels, 16);
+        for (const float value : result.image.pixels) EXPECT_TRUE(std::isfinite(value));
+    }
+    EXPECT_EQ(reconstructPaper(dump, {}).report.regions[static_cast<std::size_t>(RegionOutcome::Empty)], 1);
+}
+
+TEST(ReconstructPaper, WholeImageIsOneRegionForAFewScatteredPoints) {
+    const TemporaryFolder folder;
+    // 64 points of a smooth image on a jittered lattice, one sample each; most pixels have none.
+    SampleBand band{3, 2, 40, 40, {0}, {"R", "G", "B", "sample.x", "sample.y"}, {}};
+    band.values.resize(5);
+    const auto truth = [](double x, double y) { return 1 + std::sin(x / 10) * std::cos(y / 12); };
+    for (int p = 0; p < 1600; ++p) {
+        const int col = p % 40, row = p / 40;
+        if (col % 5 == 2 && row % 5 == 2) {
+            const double x = 3 + col + 0.3, y = 2 + row + 0.6, z = truth(x, y);
+            int c = 0;
+            for (const double value : {z, z, z, x, y})
+                band.values[static_cast<std::size_t>(c++)].push_back(static_cast<float>(value));
+        }
+        band.offsets.push_back(band.values[0].size());
+    }
+    writeDump(folder / "a.exr", band);
+    const Reconstruction result =
+        reconstructPaper(DumpReader(folder / "a.exr"), {.regionSize = 0, .colourDistance = false});
+    ASSERT_EQ(result.regions.size(), 1u);
+    EXPECT_EQ(result.regions[0].data, 64);
+    double worst = 0;
+    for (int row = 2; row < 38; ++row)
+        for (int col = 2; col < 38; ++col)
+            worst = std::max(worst, std::abs(static_cast<double>(result.image.at(col, row)[0]) -
+                                             truth(3 + col + 0.5, 2 + row + 0.5)));
+    EXPECT_LT(worst, 0.06);
+}
+
+TEST(ReconstructMean, IsTheAverageWithItsStandardError) {
+    const TemporaryFolder folder;
+    SampleBand band{0, 0, 2, 1, {0, 3, 4}, {"R", "G", "B"}, {{1, 2, 6, 5}, {0, 0, 0, 0}, {1, 1, 1, 1}}};
+    writeDump(folder / "a.exr", band);
+    const Image image = reconstructMean(DumpReader(folder / "a.exr")).image;
+    EXPECT_FLOAT_EQ(image.at(0, 0)[0], 3);
+    EXPECT_FLOAT_EQ(image.at(0, 0)[3], std::sqrt(7.0f / 3));  // s^2 = 7
+    EXPECT_FLOAT_EQ(image.at(1, 0)[0], 5);
+    EXPECT_FLOAT_EQ(image.at(1, 0)[3], std::sqrt(7.0f));  // borrowed
+}
+
+TEST(Report, IsJsonWithEveryRegion) {
+    const TemporaryFolder folder;
+    writeDump(folder / "a.exr", noisyEdge({0, 0, 8, 4}, 4));
+    Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
+    const auto document = nlohmann::json::parse(toJson(result));
+    EXPECT_EQ(document["regions"].size(), 2u);
+    EXPECT_EQ(document["report"]["samples"], 128);
+    addDiagnosticLayers(result);
+    const int layer = result.image.channel("diagnostics.range");
+    ASSERT_GE(layer, 0);
+    EXPECT_FLOAT_EQ(result.image.at(5, 2)[layer], static_cast<float>(result.regions[1].range));
+    EXPECT_GE(result.image.channel("stddev.B"), 0);
+}
+
+}  // namespace
+}  // namespace vlx
