@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "structure_kernel.h"
 #include "vector_math.h"
 
 namespace vlx::kernels {
@@ -93,37 +94,6 @@ struct Columns {
     double* out;
 };
 
-template <class V>
-[[gnu::always_inline]] inline V structureValue(const ModelColumns::Structure& s, V squared,
-                                               bool semivariance) {
-    const V u2 = squared * s.inverseSquaredRange;
-    switch (s.type) {
-        case StructureType::Spherical: {
-            const V u = minimum(squareRoot(u2), spread<V>(1.0));
-            return semivariance ? u * (1.5 - 0.5 * u * u) : (1.0 - u) * (1.0 - u) * (1.0 + 0.5 * u);
-        }
-        case StructureType::Exponential: {
-            const V u = squareRoot(u2);
-            return semivariance ? decayComplement(u) : decay(u);
-        }
-        case StructureType::Gaussian:
-            return semivariance ? decayComplement(u2) : decay(u2);
-        case StructureType::Stable: {
-            const V x = power(u2, spread<V>(s.halfShape));
-            return semivariance ? decayComplement(x) : decay(x);
-        }
-        case StructureType::Matern: {
-            const V u = squareRoot(u2);
-            if (s.halfShape == 0.5) return decay(u);
-            if (s.halfShape == 1.5) return (1.0 + u) * decay(u);
-            return (1.0 + u + u2 * (1.0 / 3.0)) * decay(u);
-        }
-        case StructureType::Linear:
-            return squareRoot(u2);
-    }
-    return squared;
-}
-
 template <int bytes>
 [[gnu::always_inline]] inline void columnsBody(const Columns& c) {
     using V = typename Vectors<double, bytes>::Type;
@@ -134,8 +104,11 @@ template <int bytes>
             squared += d * d;
         }
         V sum{};
-        for (std::size_t k = 0; k < c.count; ++k)
-            sum += c.structures[k].sill * structureValue(c.structures[k], squared, c.semivariance);
+        for (std::size_t k = 0; k < c.count; ++k) {
+            const ModelColumns::Structure& s = c.structures[k];
+            sum += s.sill * structureValue<V>(s.type, squared * s.inverseSquaredRange, spread<V>(s.halfShape),
+                                              s.halfShape, c.semivariance);
+        }
         store(c.out + i, sum);
     }
 }
