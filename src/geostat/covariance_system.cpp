@@ -1,11 +1,12 @@
 #include "variolux/geostat/covariance_system.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <sstream>
+
+#include "kernels.h"
 
 namespace vlx {
 namespace {
@@ -16,6 +17,10 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+/// Below these a float factor converges by refinement; a double factor needs none.
+constexpr double kLargestSingleCondition = 1e5;
+constexpr double kLargestPlainCondition = 1e4;
+constexpr int kMostSingleSteps = 8;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A power of two near x > 0: scaling by it rounds nothing.
@@ -46,9 +51,16 @@ CovarianceSystem::CovarianceSystem(CovarianceProblem problem) {
     rawValues_ = std::move(problem.values);
     report_.used = problem.covariance.rows();
     if (!validate(problem)) return;
-    equilibrate(problem.covariance);
-    factorise();
-    decomposeDrift(problem.drift);
+    covariance_ = std::move(problem.covariance);
+    equilibrate();
+    centreDrift(problem.drift);
+    if (problem.precision == KrigingPrecision::Double || !factoriseSingle() || !decomposeDrift()) {
+        report_.singlePrecision = false;
+        factorSingle_.resize(0, 0);
+        factoriseDouble();
+        if (!report_.ok()) return;
+        decomposeDrift();
+    }
     centreValues();
     describe();
 }
@@ -65,11 +77,9 @@ bool CovarianceSystem::validate(const CovarianceProblem& problem) {
         return fail(KrigingStatus::InvalidInput, "covariance, drift and values must have the same rows");
     if (n == 0 && driftColumns_ > 0)
         return fail(KrigingStatus::TooFewData, "no data, and the mean is not known");
-    // The strict upper half is never read.
-    const MatrixXd lower = problem.covariance.triangularView<Eigen::Lower>();
     for (const std::string& text :
-         {firstNotFinite(lower, "covariance"), firstNotFinite(problem.drift, "drift"),
-          firstNotFinite(rawValues_, "value")})
+         {firstNotFinite(problem.drift, "drift"), firstNotFinite(rawValues_, "value"),
+          firstNotFinite(problem.covariance.diagonal(), "variance")})
         if (!text.empty()) return fail(KrigingStatus::InvalidInput, text);
     for (Index i = 0; i < n; ++i)
         if (problem.covariance(i, i) < 0)
@@ -78,124 +88,189 @@ bool CovarianceSystem::validate(const CovarianceProblem& problem) {
     return true;
 }
 
-void CovarianceSystem::equilibrate(const MatrixXd& covariance) {
-    const Index n = covariance.rows();
-    const double largest = n > 0 ? covariance.diagonal().maxCoeff() : 0;
+void CovarianceSystem::equilibrate() {
+    const Index n = covariance_.rows();
+    const double largest = n > 0 ? covariance_.diagonal().maxCoeff() : 0;
     scale_.resize(n);
     for (Index i = 0; i < n; ++i) {
-        const double variance = covariance(i, i);
+        const double variance = covariance_(i, i);
         if (variance > 0) {
             scale_[i] = equilibrator(variance);
         } else {
-            // A datum without any variance: the limit of a vanishing one. Its row is set to the identity
-            // below; weights of such data dominate all others', and are equal among themselves.
+            // A datum without any variance: the limit of a vanishing one. It is factorised with a unit
+            // diagonal, so that such data outweigh all others, and are equal among themselves.
             report_.degenerate = true;
             scale_[i] = largest > 0 ? equilibrator(largest) * 0x1p50 : 1;
         }
     }
-    covariance_.resize(n, n);
     for (Index j = 0; j < n; ++j)
-        for (Index i = j; i < n; ++i) {
-            const double c = covariance(i, j) * scale_[j] * scale_[i];
-            covariance_(i, j) = c;
-            covariance_(j, i) = c;
-        }
-}
-
-void CovarianceSystem::factorise() {
-    const Index n = covariance_.rows();
-    if (n == 0) return;
-    MatrixXd matrix = covariance_;
+        covariance_.col(j).tail(n - j).array() *= scale_[j] * scale_.tail(n - j).array();
+    if (!report_.degenerate) return;
     for (Index i = 0; i < n; ++i)
-        if (matrix(i, i) == 0) {
-            matrix.row(i).setZero();
-            matrix.col(i).setZero();
-            matrix(i, i) = 1;
+        if (covariance_(i, i) == 0) {
+            covariance_.row(i).setZero();
+            covariance_.col(i).setZero();
         }
-    const VectorXd diagonal = matrix.diagonal();
-    const double noise = 4 * kEpsilon * std::max(1.0, static_cast<double>(n) / 8);
-    double jitter = 0;
-    for (;;) {
-        const Eigen::LLT<Eigen::Ref<MatrixXd>> llt(matrix);
-        const double lowest = matrix.diagonal().minCoeff();
-        if (llt.info() == Eigen::Success && (lowest * lowest > noise || jitter >= 1)) break;
-        // LLT works in place: restore the lower half from the upper one.
-        jitter = jitter == 0 ? kEpsilon * static_cast<double>(n) : 10 * jitter;
-        matrix.triangularView<Eigen::StrictlyLower>() = matrix.transpose();
-        matrix.diagonal() = diagonal * (1 + jitter);
-    }
-    factor_ = std::move(matrix);
-    report_.jitter = jitter;
-    report_.indefinite = jitter > 1e5 * kEpsilon * static_cast<double>(n);
-
-    // ||K^-1|| >= ||L^-T e_k||^2 with k the smallest pivot; ||K|| <= trace.
-    Index k = 0;
-    factor_.diagonal().minCoeff(&k);
-    VectorXd x = VectorXd::Unit(n, k);
-    factor_.topLeftCorner(k + 1, k + 1)
-        .triangularView<Eigen::Lower>()
-        .transpose()
-        .solveInPlace(x.head(k + 1));
-    report_.conditionEstimate = std::max(1.0, diagonal.sum() / static_cast<double>(n) * x.squaredNorm()) *
-                                std::sqrt(static_cast<double>(n));
 }
 
-void CovarianceSystem::solveLower(MatrixXd& x) const {
-    factor_.triangularView<Eigen::Lower>().solveInPlace(x);
-}
-
-void CovarianceSystem::solveUpper(MatrixXd& x) const {
-    factor_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
-}
-
-void CovarianceSystem::decomposeDrift(const MatrixXd& drift) {
-    const Index n = covariance_.rows(), p = driftColumns_;
-    if (p == 0) {
-        q_ = keptDrift_ = MatrixXd(n, 0);
-        centre_ = columnScale_ = RowVectorXd(0);
-        return;
-    }
+void CovarianceSystem::centreDrift(const MatrixXd& drift) {
+    const Index n = scale_.size(), p = driftColumns_;
+    centre_ = RowVectorXd::Zero(p);
+    columnScale_ = RowVectorXd::Ones(p);
+    drift_.resize(n, p);
+    if (p == 0) return;
     for (Index j = 0; j < p && constantColumn_ < 0; ++j)
         if (drift(0, j) != 0 && (drift.col(j).array() == drift(0, j)).all()) constantColumn_ = j;
     if (constantColumn_ >= 0) constant_ = drift(0, constantColumn_);
 
     // Centred at the mean weighted by 1 / K_ii, so that a few precise data do not make columns parallel.
-    const VectorXd precision = (scale_ / (n > 0 ? scale_.maxCoeff() : 1)).array().square();
-    MatrixXd internal(n, p);
-    centre_ = RowVectorXd::Zero(p);
-    columnScale_ = RowVectorXd::Ones(p);
+    const VectorXd precision = (scale_ / scale_.maxCoeff()).array().square();
+    const double sum = precision.sum();
     for (Index j = 0; j < p; ++j) {
         if (j == constantColumn_) {
-            internal.col(j).setOnes();
+            drift_.col(j) = scale_;
             continue;
         }
         const double magnitude = drift.col(j).cwiseAbs().maxCoeff();
         const double unit = magnitude > 0 ? powerOfTwo(magnitude) : 1;
-        if (constantColumn_ >= 0) centre_[j] = unit * (drift.col(j) / unit).dot(precision) / precision.sum();
-        internal.col(j) = (drift.col(j).array() - centre_[j]) / unit;
+        if (constantColumn_ >= 0) centre_[j] = unit * (drift.col(j) / unit).dot(precision) / sum;
+        drift_.col(j) = (drift.col(j).array() - centre_[j]) / unit;
         // What is left of a constant after centring is rounding.
-        if (internal.col(j).cwiseAbs().maxCoeff() <= 4 * kEpsilon && constantColumn_ >= 0)
-            internal.col(j).setZero();
+        if (constantColumn_ >= 0 && drift_.col(j).cwiseAbs().maxCoeff() <= 4 * kEpsilon)
+            drift_.col(j).setZero();
+        drift_.col(j).array() *= scale_.array();
         columnScale_[j] = 1 / unit;
     }
-    MatrixXd a = scale_.asDiagonal() * internal;
-    const MatrixXd equilibrated = a;
-    solveLower(a);
-    RowVectorXd normScale(p);
+}
+
+/// The matrix to factorise, with the drift's columns as rows below it: the factorisation carries them along.
+template <class Scalar>
+double CovarianceSystem::factoriseWith(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& factor,
+                                       double jitter) const {
+    const Index n = covariance_.rows(), p = driftColumns_;
+    const Index leading = kernels::leadingDimension(n + p);
+    factor.resize(leading, n);
+    for (Index j = 0; j < n; ++j) {
+        // Vectors of rows begin above the diagonal and end below the last row: both must be finite.
+        const Index begin = j / 32 * 32;
+        factor.col(j).segment(begin, j - begin).setZero();
+        factor.col(j).segment(j, n - j) = covariance_.col(j).tail(n - j).template cast<Scalar>();
+        factor.col(j).segment(n, p) = drift_.row(j).transpose().template cast<Scalar>();
+        factor.col(j).tail(leading - n - p).setZero();
+        const double diagonal = covariance_(j, j) > 0 ? covariance_(j, j) : 1;
+        factor(j, j) = static_cast<Scalar>(diagonal * (1 + jitter));
+    }
+    return static_cast<double>(kernels::cholesky(factor.data(), n, n + p, leading));
+}
+
+/// ||K^-1|| >= ||L^-T e_k||^2 with k the smallest pivot, ||K|| <= trace; their product is usually between the
+/// condition number and its n-th part, so the root of n goes to each side.
+template <class Scalar>
+double CovarianceSystem::estimateCondition(
+    const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& factor) const {
+    const Index n = covariance_.rows();
+    Index k = 0;
+    factor.diagonal().head(n).minCoeff(&k);
+    Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>::Unit(k + 1, k);
+    factor.topLeftCorner(k + 1, k + 1).template triangularView<Eigen::Lower>().transpose().solveInPlace(x);
+    const double size = covariance_.diagonal().sum() / std::sqrt(static_cast<double>(n));
+    return std::max(1.0, size * static_cast<double>(x.squaredNorm()));
+}
+
+bool CovarianceSystem::factoriseSingle() {
+    const Index n = covariance_.rows();
+    if (n == 0 || report_.degenerate) return false;
+    const double lowest = factoriseWith(factorSingle_, 0);
+    const double noise = 4 * 0x1p-23 * std::max(1.0, static_cast<double>(n) / 8);
+    if (lowest > noise) report_.conditionEstimate = estimateCondition(factorSingle_);
+    report_.singlePrecision = lowest > noise && report_.conditionEstimate < kLargestSingleCondition;
+    return report_.singlePrecision;
+}
+
+void CovarianceSystem::factoriseDouble() {
+    const Index n = covariance_.rows();
+    if (n == 0) return;
+    const double noise = 4 * kEpsilon * std::max(1.0, static_cast<double>(n) / 8);
+    double jitter = 0;
+    for (;;) {
+        const double lowest = factoriseWith(factor_, jitter);
+        if (lowest > noise || (lowest > 0 && jitter >= 1)) break;
+        if (jitter == 0) {
+            // A covariance that is not finite ends here too.
+            const MatrixXd lower = covariance_.triangularView<Eigen::Lower>();
+            const std::string text = firstNotFinite(lower, "covariance");
+            if (!text.empty()) {
+                report_.status = KrigingStatus::InvalidInput;
+                report_.message = text;
+                return;
+            }
+        }
+        jitter = jitter == 0 ? kEpsilon * static_cast<double>(n) : 10 * jitter;
+    }
+    report_.jitter = jitter;
+    report_.indefinite = jitter > 1e5 * kEpsilon * static_cast<double>(n);
+    report_.conditionEstimate = estimateCondition(factor_);
+}
+
+/// Ill-conditioned, or only approximately factorised: refine weights, and take variances from the quadratic
+/// form.
+bool CovarianceSystem::careful() const {
+    return report_.singlePrecision || report_.degenerate || report_.jitter > 0 ||
+           report_.conditionEstimate > kLargestPlainCondition;
+}
+
+void CovarianceSystem::solveLower(MatrixXd& x) const {
+    const Index n = covariance_.rows();
+    if (n == 0 || x.cols() == 0) return;
+    if (!report_.singlePrecision) return factor_.topRows(n).triangularView<Eigen::Lower>().solveInPlace(x);
+    Eigen::MatrixXf y = x.cast<float>();
+    factorSingle_.topRows(n).triangularView<Eigen::Lower>().solveInPlace(y);
+    x = y.cast<double>();
+}
+
+void CovarianceSystem::solveUpper(MatrixXd& x) const {
+    const Index n = covariance_.rows();
+    if (n == 0 || x.cols() == 0) return;
+    if (!report_.singlePrecision)
+        return factor_.topRows(n).triangularView<Eigen::Lower>().transpose().solveInPlace(x);
+    Eigen::MatrixXf y = x.cast<float>();
+    factorSingle_.topRows(n).triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+    x = y.cast<double>();
+}
+
+/// False if the drift's columns are too nearly dependent for a float factor.
+bool CovarianceSystem::decomposeDrift() {
+    const Index n = covariance_.rows(), p = driftColumns_;
+    kept_.clear();
+    dropped_.clear();
+    if (p == 0) {
+        q_ = keptDrift_ = MatrixXd(n, 0);
+        return true;
+    }
+    MatrixXd a = report_.singlePrecision ? MatrixXd(factorSingle_.middleRows(n, p).transpose().cast<double>())
+                                         : MatrixXd(factor_.middleRows(n, p).transpose());
     for (Index j = 0; j < p; ++j) {
         const double norm = a.col(j).norm();
-        normScale[j] = norm > 0 ? 1 / powerOfTwo(norm) : 1;
-        a.col(j) *= normScale[j];
+        const double scale = norm > 0 ? 1 / powerOfTwo(norm) : 1;
+        a.col(j) *= scale;
+        drift_.col(j) *= scale;
+        columnScale_[j] *= scale;
     }
-    columnScale_ = columnScale_.cwiseProduct(normScale);
-
-    Eigen::ColPivHouseholderQR<MatrixXd> qr(a);
+    if (p == 1 && a.squaredNorm() > 0) {  // ordinary kriging: no pivoting to do
+        const double norm = a.norm();
+        r_ = MatrixXd::Constant(1, 1, norm);
+        q_ = a / norm;
+        dependence_.resize(1, 0);
+        kept_ = {0};
+        keptDrift_ = drift_;
+        return true;
+    }
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(a);
     const double tolerance = 100 * kEpsilon * static_cast<double>(std::max(n, p));
+    const auto pivot = [&](Index k) { return std::abs(qr.matrixQR()(k, k)); };
     Index rank = 0;
-    const Index most = std::min(n, p);
-    while (rank < most && std::abs(qr.matrixQR()(rank, rank)) > tolerance * std::abs(qr.matrixQR()(0, 0)) &&
-           qr.matrixQR()(rank, rank) != 0)
-        ++rank;
+    while (rank < std::min(n, p) && pivot(rank) > tolerance * pivot(0)) ++rank;
+    if (report_.singlePrecision && (rank < p || pivot(p - 1) < 1e-3 * pivot(0))) return false;
     const auto& order = qr.colsPermutation().indices();
     for (Index j = 0; j < p; ++j) (j < rank ? kept_ : dropped_).push_back(order[j]);
     report_.droppedDrift = static_cast<int>(p - rank);
@@ -205,10 +280,8 @@ void CovarianceSystem::decomposeDrift(const MatrixXd& drift) {
     q_.applyOnTheLeft(qr.householderQ());
     dependence_ = qr.matrixQR().topRightCorner(rank, p - rank);
     r_.triangularView<Eigen::Upper>().solveInPlace(dependence_);
-    keptDrift_.resize(n, rank);
-    for (Index j = 0; j < rank; ++j)
-        keptDrift_.col(j) = equilibrated.col(kept_[static_cast<std::size_t>(j)]) *
-                            normScale[kept_[static_cast<std::size_t>(j)]];
+    keptDrift_ = drift_(Eigen::all, kept_);
+    return true;
 }
 
 void CovarianceSystem::centreValues() {
@@ -242,6 +315,16 @@ void CovarianceSystem::describe() {
                    << (report_.indefinite ? ": the covariances are indefinite" : "");
     if (report_.droppedDrift > 0) separate() << report_.droppedDrift << " dependent drift column(s) dropped";
     report_.message = text.str();
+}
+
+/// The same system with a double factor: where refinement of a float one does not converge.
+CovarianceSystem CovarianceSystem::inDouble() const {
+    CovarianceSystem out = *this;
+    out.report_.singlePrecision = false;
+    out.factorSingle_.resize(0, 0);
+    out.factoriseDouble();
+    out.decomposeDrift();
+    return out;
 }
 
 CovarianceSystem::TargetDrift CovarianceSystem::targetDrift(const MatrixXd& drift) const {
@@ -279,32 +362,47 @@ CovarianceSystem::TargetDrift CovarianceSystem::targetDrift(const MatrixXd& drif
     return out;
 }
 
-MatrixXd CovarianceSystem::solve(const MatrixXd& c0, const MatrixXd& f0) const {
-    MatrixXd multipliers = MatrixXd::Zero(f0.rows(), c0.cols());
-    // Adds the solution of [K F; F' 0] [v; mu] = [c; f].
-    const auto addSolution = [&](const MatrixXd& c, const MatrixXd& f, MatrixXd& v) {
-        MatrixXd x = c;
-        solveLower(x);
-        MatrixXd t = f;
-        r_.triangularView<Eigen::Upper>().transpose().solveInPlace(t);
-        t.noalias() -= q_.transpose() * x;
-        x.noalias() += q_ * t;
+CovarianceSystem::Solution CovarianceSystem::solveOnce(const MatrixXd& c0, const MatrixXd& f0) const {
+    Solution out{c0, f0, RowVectorXd::Zero(c0.cols())};
+    MatrixXd& x = out.weights;
+    solveLower(x);
+    if (f0.rows() == 0) {
+        out.explained = x.colwise().squaredNorm();
         solveUpper(x);
-        v += x;
-        r_.triangularView<Eigen::Upper>().solveInPlace(t);
-        multipliers -= t;
-    };
-    MatrixXd v = MatrixXd::Zero(c0.rows(), c0.cols());
-    addSolution(c0, f0, v);
-    if (report_.conditionEstimate > 1e4 && !report_.degenerate) {
-        MatrixXd c = c0;
-        c.noalias() -= covariance_ * v;
-        c.noalias() -= keptDrift_ * multipliers;
-        MatrixXd f = f0;
-        f.noalias() -= keptDrift_.transpose() * v;
-        addSolution(c, f, v);
+        return out;
     }
-    return v;
+    MatrixXd& t = out.multipliers;
+    r_.triangularView<Eigen::Upper>().transpose().solveInPlace(t);
+    t.noalias() -= q_.transpose() * x;
+    out.explained = x.colwise().squaredNorm() - t.colwise().squaredNorm();
+    x.noalias() += q_ * t;
+    solveUpper(x);
+    r_.triangularView<Eigen::Upper>().solveInPlace(t);
+    t = -t;
+    return out;
+}
+
+CovarianceSystem::Solution CovarianceSystem::solve(const MatrixXd& c0, const MatrixXd& f0) const {
+    Solution out = solveOnce(c0, f0);
+    if (!careful() || report_.degenerate) return out;
+    double last = std::numeric_limits<double>::infinity();
+    for (int step = 0; step < (report_.singlePrecision ? kMostSingleSteps : 1); ++step) {
+        MatrixXd c = c0;
+        c.noalias() -= covariance_.selfadjointView<Eigen::Lower>() * out.weights;
+        c.noalias() -= keptDrift_ * out.multipliers;
+        MatrixXd f = f0;
+        f.noalias() -= keptDrift_.transpose() * out.weights;
+        const Solution correction = solveOnce(c, f);
+        out.weights += correction.weights;
+        out.multipliers += correction.multipliers;
+        const double change = (correction.weights.colwise().norm().array() /
+                               out.weights.colwise().norm().array().max(std::numeric_limits<double>::min()))
+                                  .maxCoeff();
+        out.converged = change < 1e-12;
+        if (change < 1e-15 || !(change < last)) break;
+        last = change;
+    }
+    return out;
 }
 
 KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
@@ -334,8 +432,14 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
         }
     }
     const TargetDrift f0 = targetDrift(drift);
-    const MatrixXd v = solve(c0, f0.kept);
-    const MatrixXd kv = covariance_ * v;
+    const Solution solution = solve(c0, f0.kept);
+    if (report_.singlePrecision && !solution.converged) return inDouble().predict(targets, options);
+    const MatrixXd& v = solution.weights;
+    RowVectorXd variance = targets.variance.transpose() - solution.explained;
+    if (careful()) {
+        const MatrixXd kv = covariance_.selfadjointView<Eigen::Lower>() * v;
+        variance = targets.variance.transpose() + v.cwiseProduct(kv - 2 * c0).colwise().sum();
+    }
     for (Index t = 0; t < m; ++t) {
         const auto at = static_cast<std::size_t>(t);
         if (!finite[at]) continue;
@@ -350,9 +454,8 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
         out.status[at] = f0.estimable[at] ? TargetStatus::Ok : TargetStatus::NotEstimable;
         const RowVectorXd residual = v.col(t).transpose() * values_;
         out.estimate.row(t) = reference_ * f0.constant[t] + residual.cwiseProduct(valueScale_);
-        const double variance = targets.variance[t] + v.col(t).dot(kv.col(t) - 2 * c0.col(t));
-        out.lowestVariance = std::min(out.lowestVariance, variance);
-        out.variance[t] = std::max(0.0, variance);
+        out.lowestVariance = std::min(out.lowestVariance, variance[t]);
+        out.variance[t] = std::max(0.0, variance[t]);
         if (options.weights) out.weights.row(t) = v.col(t).cwiseProduct(scale_).transpose();
     }
     return out;
@@ -363,9 +466,11 @@ DriftEstimate CovarianceSystem::drift() const {
     DriftEstimate out{MatrixXd::Zero(p, columns), MatrixXd::Zero(p, p)};
     if (!report_.ok() || p == 0) return out;
     const auto rank = static_cast<Index>(kept_.size());
-    const MatrixXd v = solve(MatrixXd::Zero(covariance_.rows(), rank), MatrixXd::Identity(rank, rank));
+    const Solution solution = solve(MatrixXd::Zero(covariance_.rows(), rank), MatrixXd::Identity(rank, rank));
+    if (report_.singlePrecision && !solution.converged) return inDouble().drift();
+    const MatrixXd& v = solution.weights;
     const MatrixXd beta = v.transpose() * values_;
-    const MatrixXd covariance = v.transpose() * covariance_ * v;
+    const MatrixXd covariance = v.transpose() * (covariance_.selfadjointView<Eigen::Lower>() * v);
     // F_internal = F M, so beta = M beta_internal.
     MatrixXd map = MatrixXd::Zero(p, rank);
     for (Index j = 0; j < rank; ++j) {
@@ -391,6 +496,7 @@ LeaveOneOut CovarianceSystem::leaveOneOut() const {
     out.variance = VectorXd::Constant(n, kNaN);
     out.status.assign(static_cast<std::size_t>(n), TargetStatus::NotEstimable);
     if (!report_.ok() || n == 0) return out;
+    if (report_.singlePrecision) return inDouble().leaveOneOut();
     // Q = W'W with W = (I - Q_drift Q_drift') L^-1: a sum of squares, nothing cancels.
     MatrixXd w = MatrixXd::Identity(n, n);
     solveLower(w);

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <sstream>
 
+#include "kernels.h"
+
 namespace vlx {
 namespace {
 
@@ -172,6 +174,13 @@ void KrigingSystem::merge() {
         else
             groups.push_back({order[i]});
     }
+    // Groups at one place that differ in their external drift.
+    std::vector<std::pair<Index, Index>> twins;
+    for (std::size_t a = 0; q > 0 && a < groups.size(); ++a)
+        for (std::size_t b = a + 1; b < groups.size(); ++b) {
+            if (keys.col(groups[a][0]).head(d) != keys.col(groups[b][0]).head(d)) break;
+            twins.emplace_back(groups[a][0], groups[b][0]);
+        }
     std::sort(groups.begin(), groups.end());
     const auto rows = static_cast<Index>(groups.size());
     report_.merged = static_cast<Index>(order.size()) - rows;
@@ -206,14 +215,18 @@ void KrigingSystem::merge() {
         }
         values_.row(r) = first + mean;
     }
-    places_ = place(positions_.transpose());
+    for (const auto& [a, b] : twins)
+        twins_.emplace_back(row_[static_cast<std::size_t>(a)], row_[static_cast<std::size_t>(b)]);
+    // Padded with zeros to whole vectors.
+    places_ = MatrixXd::Zero((rows + 7) / 8 * 8, transform_.size() > 0 ? transform_.rows() : d);
+    places_.topRows(rows) = place(positions_.transpose());
 }
 
-/// Scaled and transformed coordinates, one point a column. Untransformed coordinates are scaled but not
+/// Scaled and transformed coordinates, one point a row. Untransformed coordinates are scaled but not
 /// centred: their differences are then as exact as the input.
 MatrixXd KrigingSystem::place(const MatrixXd& points) const {
-    if (transform_.size() == 0) return points.transpose() * coordinateScale_;
-    return transform_ * ((points.rowwise() - origin_.transpose()) * coordinateScale_).transpose();
+    if (transform_.size() == 0) return points * coordinateScale_;
+    return (points.rowwise() - origin_.transpose()) * (coordinateScale_ * transform_).transpose();
 }
 
 MatrixXd KrigingSystem::driftRows(const MatrixXd& points, const MatrixXd& external) const {
@@ -238,37 +251,51 @@ MatrixXd KrigingSystem::driftRows(const MatrixXd& points, const MatrixXd& extern
 }
 
 void KrigingSystem::assemble(KrigingPrecision precision) {
-    const Index n = places_.cols();
+    const Index n = errors_.size();
     CovarianceProblem problem;
     problem.precision = precision;
     problem.drift = driftRows(positions_.transpose(), external_);
     problem.values = values_;
     if (problem.drift.cols() == 0 && drift_.mean.size() > 0) problem.values.rowwise() -= drift_.mean;
 
+    columns_ = std::make_shared<kernels::ModelColumns>(model_);
+    const auto semivariancesTo = [&](const VectorXd& point, Index first, double* out) {
+        columns_->semivariances(places_.data(), places_.rows(), places_.cols(), point.data(), first, n, out);
+    };
+    VectorXd column(places_.rows() + 8);  // whole vectors are written
     if (n > 0 && constantColumn() >= 0) {
-        const VectorXd centre = place(origin_.transpose());
-        const VectorXd h = (places_.colwise() - centre).colwise().norm();
-        const double radius = h.maxCoeff();
+        const VectorXd centre = place(origin_.transpose()).transpose();
+        const double radius =
+            std::sqrt((places_.topRows(n).rowwise() - centre.transpose()).rowwise().squaredNorm().maxCoeff());
         if (!model_.bounded() || (radius > 0 && semivariance(model_, 2 * radius) < 0.1 * structureSill_)) {
             report_.generalisedCovariance = true;
-            centreGamma_ = h.unaryExpr([&](double x) { return semivariance(model_, x); });
+            semivariancesTo(centre, 0, column.data());
+            centreGamma_ = column.head(n);
             level_ = centreGamma_.maxCoeff();
             if (level_ == 0) level_ = structureSill_;
         }
     }
     MatrixXd& k = problem.covariance;
     k.resize(n, n);
+    VectorXd point(places_.cols());
     for (Index j = 0; j < n; ++j) {
-        k(j, j) = nugget_ + errors_[j] +
-                  (report_.generalisedCovariance ? level_ + 2 * centreGamma_[j] : structureSill_);
-        for (Index i = j + 1; i < n; ++i) {
-            const double h = (places_.col(i) - places_.col(j)).norm();
-            k(i, j) = report_.generalisedCovariance
-                          ? level_ + centreGamma_[i] + centreGamma_[j] - semivariance(model_, h)
-                          : covariance(model_, h);
-            if (positions_.col(i) == positions_.col(j)) k(i, j) += nugget_;
+        point = places_.row(j).transpose();
+        auto lower = k.col(j).tail(n - j);
+        if (report_.generalisedCovariance) {
+            semivariancesTo(point, j, column.data());
+            lower = (level_ + centreGamma_[j]) + centreGamma_.tail(n - j).array() -
+                    column.segment(j, n - j).array();
+            k(j, j) = level_ + 2 * centreGamma_[j];
+        } else {
+            columns_->covariances(places_.data(), places_.rows(), places_.cols(), point.data(), j, n,
+                                  column.data());
+            lower = column.segment(j, n - j);
+            k(j, j) = structureSill_;
         }
+        k(j, j) += nugget_ + errors_[j];
     }
+    // Data at one place that were not merged (their external drift differs) share the nugget.
+    for (const auto& [i, j] : twins_) k(std::max(i, j), std::min(i, j)) += nugget_;
     system_ = CovarianceSystem(std::move(problem));
 }
 
@@ -308,7 +335,7 @@ KrigingSystem::Block KrigingSystem::block(const KrigingTargets& targets, Index t
 
 KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
                                          const KrigingPredictOptions& options) const {
-    const Index m = targets.count(), n = places_.cols(), q = external_.cols();
+    const Index m = targets.count(), n = errors_.size(), q = external_.cols();
     const bool generalised = report_.generalisedCovariance;
     const bool field = options.quantity == KrigingQuantity::Field;
     const bool shapes = report_.ok() && targets.points.cols() == dimension_ &&
@@ -321,7 +348,8 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
     lower.exactDatum.assign(static_cast<std::size_t>(m), -1);
     const Index columns = driftRows(MatrixXd(0, dimension_), MatrixXd(0, q)).cols();
     lower.drift = MatrixXd::Zero(m, columns);
-    const VectorXd centre = place(origin_.transpose());
+    const VectorXd centre = place(origin_.transpose()).transpose();
+    VectorXd column(places_.rows() + 8);  // whole vectors are written
     for (Index t = 0; shapes && t < m; ++t) {
         const Block target = block(targets, t);
         if (!target.valid) continue;
@@ -343,20 +371,26 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
         const MatrixXd places = place(target.points);
         double within = 0;   // mean covariance, or semivariance, inside the block
         double outward = 0;  // generalised: mean semivariance between centre and block
-        for (Index a = 0; a < places.cols(); ++a) {
-            // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
-            const double g = generalised ? semivariance(model_, (places.col(a) - centre).norm()) : 0;
-            outward += target.weights[a] * g;
-            for (Index i = 0; i < n; ++i) {
-                const double h = (places_.col(i) - places.col(a)).norm();
-                c0[i] +=
-                    target.weights[a] * (generalised ? g - semivariance(model_, h) : covariance(model_, h));
+        for (Index a = 0; a < places.rows(); ++a) {
+            const VectorXd point = places.row(a).transpose();
+            if (generalised) {
+                // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
+                const double g = semivariance(model_, (point - centre).norm());
+                outward += target.weights[a] * g;
+                columns_->semivariances(places_.data(), places_.rows(), places_.cols(), point.data(), 0, n,
+                                        column.data());
+                c0.array() += target.weights[a] * (g - column.head(n).array());
+            } else {
+                columns_->covariances(places_.data(), places_.rows(), places_.cols(), point.data(), 0, n,
+                                      column.data());
+                c0 += target.weights[a] * column.head(n);
             }
-            for (Index b = 0; b < places.cols(); ++b) {
-                const double h = (places.col(a) - places.col(b)).norm();
-                within += target.weights[a] * target.weights[b] *
+            for (Index b = 0; b < a; ++b) {
+                const double h = (places.row(a) - places.row(b)).norm();
+                within += 2 * target.weights[a] * target.weights[b] *
                           (generalised ? semivariance(model_, h) : covariance(model_, h));
             }
+            if (!generalised) within += target.weights[a] * target.weights[a] * structureSill_;
         }
         lower.variance[t] = within;
         if (generalised)
@@ -388,8 +422,8 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
         out.weights = MatrixXd::Zero(m, static_cast<Index>(row_.size()));
         for (std::size_t i = 0; i < row_.size(); ++i)
             if (row_[i] >= 0) {
-                const auto column = static_cast<Index>(i);
-                out.weights.col(column) = merged.col(row_[i]) * share_[column];
+                const auto datum = static_cast<Index>(i);
+                out.weights.col(datum) = merged.col(row_[i]) * share_[datum];
             }
     }
     return out;
@@ -414,7 +448,7 @@ DriftEstimate KrigingSystem::drift() const {
 /// Each coefficient as a target of its own; their covariance w'K w in the field's own covariance,
 /// K = sill - gamma + errors.
 DriftEstimate KrigingSystem::generalisedDrift() const {
-    const Index n = places_.cols(), constant = constantColumn();
+    const Index n = errors_.size(), constant = constantColumn();
     CovarianceTargets targets;
     const Index p = driftRows(MatrixXd(0, dimension_), MatrixXd(0, external_.cols())).cols();
     targets.drift = MatrixXd::Identity(p, p);
@@ -428,7 +462,7 @@ DriftEstimate KrigingSystem::generalisedDrift() const {
     MatrixXd gamma(n, n);
     for (Index j = 0; j < n; ++j)
         for (Index i = 0; i < n; ++i) {
-            gamma(i, j) = semivariance(model_, (places_.col(i) - places_.col(j)).norm());
+            gamma(i, j) = semivariance(model_, (places_.row(i) - places_.row(j)).norm());
             if (i == j) gamma(i, j) -= errors_[i];
             if (positions_.col(i) == positions_.col(j)) gamma(i, j) -= nugget_;
         }

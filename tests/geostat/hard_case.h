@@ -31,8 +31,10 @@ struct HardCase {
 /// Throws std::exception on a file that is not a hard case.
 HardCase readHardCase(const std::string& path);
 
-/// Everything that is wrong with the library's answer to this case when solved with `precision`; empty =
-/// passed.
-std::vector<std::string> checkHardCase(const HardCase& hardCase, KrigingPrecision precision);
+/// The library's ways to an answer.
+enum class Solver { Double, Single, Batched };
+
+/// Everything that is wrong with the answer to this case; empty = passed.
+std::vector<std::string> checkHardCase(const HardCase& hardCase, Solver solver);
 
 }  // namespace vlx::testing

@@ -12,6 +12,11 @@ namespace {
 
 using vlx::testing::HardCase;
 
+const std::pair<vlx::testing::Solver, std::string> kSolvers[] = {
+    {vlx::testing::Solver::Double, ""},
+    {vlx::testing::Solver::Single, "single precision: "},
+    {vlx::testing::Solver::Batched, "batched: "}};
+
 struct Pair {
     const char* first;
     const char* second;
@@ -68,11 +73,10 @@ int main(int argc, char** argv) {
     for (const auto& path : paths) {
         try {
             const HardCase hardCase = vlx::testing::readHardCase(path.string());
-            std::vector<std::string> failures =
-                vlx::testing::checkHardCase(hardCase, vlx::KrigingPrecision::Double);
-            for (const std::string& failure :
-                 vlx::testing::checkHardCase(hardCase, vlx::KrigingPrecision::Single))
-                failures.push_back("single precision: " + failure);
+            std::vector<std::string> failures;
+            for (const auto& [solver, name] : kSolvers)
+                for (const std::string& failure : vlx::testing::checkHardCase(hardCase, solver))
+                    failures.push_back(name + failure);
             report(hardCase.id, failures);
             cases[prefix(hardCase.id)] = hardCase;
         } catch (const std::exception& problem) {

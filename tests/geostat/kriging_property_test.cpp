@@ -7,6 +7,7 @@
 
 #include "random_problem.h"
 #include "variolux/geostat/kriging.h"
+#include "variolux/geostat/kriging_batch.h"
 
 namespace vlx {
 namespace {
@@ -344,6 +345,61 @@ TEST(KrigingProperty, DriftCoefficientsEqualTheDriftAtTargets) {
             EXPECT_NEAR(p.variance[t], f.dot(d.covariance * f), 1e-8 * size * size * varianceSize(r.problem));
         }
     });
+}
+
+TEST(KrigingProperty, SinglePrecisionEqualsDouble) {
+    int single = 0;
+    forEachSystem(12, {}, [&](const RandomProblem& r, const KrigingSystem&) {
+        KrigingProblem p = r.problem;
+        p.precision = KrigingPrecision::Single;
+        single += KrigingSystem(p).report().singlePrecision ? 1 : 0;
+        expectSame(r, predict(r.problem, r.targets), predict(p, r.targets), 1, 0, 1, 1e-10);
+    });
+    EXPECT_GT(single, kSystems / 2);
+}
+
+TEST(KrigingProperty, BatchesEqualSingleSystemsHoweverTheyAreGrouped) {
+    Random random(13);
+    std::vector<RandomProblem> all;
+    std::vector<KrigingProblem> problems;
+    std::vector<KrigingTargets> targets;
+    RandomProblemOptions options;
+    options.mostData = 130;
+    options.targets = 3;
+    for (int k = 0; k < kSystems; ++k) {
+        all.push_back(randomProblem(random, options));
+        // Targets in general position: a datum that is reproduced exactly leaves the vector path.
+        if (random.chance(0.8)) all.back().targets.points.array() += 1e-3;
+        problems.push_back(all.back().problem);
+        targets.push_back(all.back().targets);
+    }
+    const std::vector<KrigingBatchAnswer> together = krigeBatch(problems, targets);
+    int batched = 0;
+    for (std::size_t k = 0; k < all.size() && !HasFailure(); ++k) {
+        SCOPED_TRACE("system " + std::to_string(k));
+        const KrigingSystem system(problems[k]);
+        ASSERT_EQ(together[k].report.ok(), system.report().ok());
+        batched += together[k].batched ? 1 : 0;
+        if (system.report().conditionEstimate < kWellConditioned)
+            expectSame(all[k], predict(problems[k], targets[k]), together[k].prediction, 1, 0, 1);
+    }
+    EXPECT_GT(batched, kSystems / 5);
+    // The same bits alone, in reverse order, and with fewer lanes.
+    const auto expectIdentical = [](const KrigingBatchAnswer& a, const KrigingBatchAnswer& b) {
+        EXPECT_EQ(a.batched, b.batched);
+        EXPECT_EQ(a.prediction.status, b.prediction.status);
+        EXPECT_TRUE((a.prediction.estimate.array() == b.prediction.estimate.array()).all());
+        EXPECT_TRUE((a.prediction.variance.array() == b.prediction.variance.array()).all());
+    };
+    std::vector<KrigingProblem> reversedProblems(problems.rbegin(), problems.rend());
+    std::vector<KrigingTargets> reversedTargets(targets.rbegin(), targets.rend());
+    for (const int lanes : {0, 4, 2}) {
+        const auto reversed = krigeBatch(reversedProblems, reversedTargets, {.lanes = lanes});
+        for (std::size_t k = 0; k < all.size() && !HasFailure(); ++k)
+            expectIdentical(together[k], reversed[all.size() - 1 - k]);
+    }
+    for (std::size_t k = 0; k < all.size() && !HasFailure(); k += 7)
+        expectIdentical(together[k], krigeBatch({problems[k]}, {targets[k]}).front());
 }
 
 /// Simulates fields with the model's covariance, adds errors of the stated variances, kriges them, and

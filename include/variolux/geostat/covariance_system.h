@@ -141,29 +141,46 @@ class CovarianceSystem {
         std::vector<bool> estimable;
     };
 
+    /// Equilibrated weights v = D^-1 w and multipliers; explained = C00 - variance, by the direct formula.
+    struct Solution {
+        Eigen::MatrixXd weights, multipliers;
+        Eigen::RowVectorXd explained;
+        bool converged = true;
+    };
+
     bool validate(const CovarianceProblem& problem);
-    void equilibrate(const Eigen::MatrixXd& covariance);
-    void factorise();
-    void decomposeDrift(const Eigen::MatrixXd& drift);
+    void equilibrate();
+    void centreDrift(const Eigen::MatrixXd& drift);
+    bool factoriseSingle();
+    void factoriseDouble();
+    bool decomposeDrift();
     void centreValues();
     void describe();
+    bool careful() const;
+    CovarianceSystem inDouble() const;
+    template <class Scalar>
+    double factoriseWith(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& factor, double jitter) const;
+    template <class Scalar>
+    double estimateCondition(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& factor) const;
     TargetDrift targetDrift(const Eigen::MatrixXd& drift) const;
     void solveLower(Eigen::MatrixXd& x) const;
     void solveUpper(Eigen::MatrixXd& x) const;
-    /// Equilibrated weights for right-hand sides c0 (n x m) and kept drift f0 (rank x m), refined.
-    Eigen::MatrixXd solve(const Eigen::MatrixXd& c0, const Eigen::MatrixXd& f0) const;
+    Solution solveOnce(const Eigen::MatrixXd& c0, const Eigen::MatrixXd& f0) const;
+    Solution solve(const Eigen::MatrixXd& c0, const Eigen::MatrixXd& f0) const;
 
     KrigingReport report_;
-    Eigen::MatrixXd covariance_;  // D K D, both halves, without jitter
-    Eigen::VectorXd scale_;       // D
-    Eigen::MatrixXd factor_;      // L of the accepted matrix
+    Eigen::MatrixXd covariance_;    // D K D, lower half, without jitter
+    Eigen::VectorXd scale_;         // D
+    Eigen::MatrixXd factor_;        // L in its first n rows, lower half; (L^-1 D F)' below
+    Eigen::MatrixXf factorSingle_;  // the same, if report_.singlePrecision
 
     // Internal drift column j = (F_j - centre_j F_constant) * columnScale_j.
     Eigen::Index driftColumns_ = 0;
     Eigen::Index constantColumn_ = -1;  // of F, -1 if none
     double constant_ = 1;               // its value
     Eigen::RowVectorXd centre_, columnScale_;
-    Eigen::MatrixXd keptDrift_;                 // n x rank: D F in the internal basis, kept columns
+    Eigen::MatrixXd drift_;                     // D F in the internal basis
+    Eigen::MatrixXd keptDrift_;                 // its linearly independent columns
     Eigen::MatrixXd q_, r_;                     // L^-1 keptDrift_ = Q R
     Eigen::MatrixXd dependence_;                // dropped columns = kept columns * dependence_
     std::vector<Eigen::Index> kept_, dropped_;  // columns of F

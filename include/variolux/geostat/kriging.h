@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
+#include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "variolux/geostat/covariance_system.h"
@@ -30,6 +32,10 @@
 ///   dependent drift columns  dropped; targets that need them are flagged NotEstimable
 ///   no data                  known mean: the mean and the sill; otherwise TooFewData
 namespace vlx {
+
+namespace kernels {
+class ModelColumns;
+}
 
 /// Polynomial part of the drift. `None` is a known mean (simple kriging) unless external columns are given.
 enum class DriftPolynomial {
@@ -139,6 +145,7 @@ class KrigingSystem {
 
     KrigingReport report_;
     VariogramModel model_;  // ranges in scaled coordinates, sills in scaled variances
+    std::shared_ptr<const kernels::ModelColumns> columns_;
     double nugget_ = 0, structureSill_ = 0;
     DriftModel drift_;
     Eigen::Index dimension_ = 0;
@@ -147,13 +154,14 @@ class KrigingSystem {
     double coordinateScale_ = 1, varianceScale_ = 1;  // powers of two: scaled = original * scale
 
     // Factorised data, after merging.
-    Eigen::MatrixXd positions_;    // d x n, as given
-    Eigen::MatrixXd places_;       // k x n: scaled and transformed
-    Eigen::VectorXd errors_;       // scaled variances
-    Eigen::MatrixXd external_;     // n x q
-    Eigen::MatrixXd values_;       // n x c
-    Eigen::VectorXd centreGamma_;  // generalised covariance: gamma(x_i - centre)
-    double level_ = 0;             // and its constant, max centreGamma_
+    Eigen::MatrixXd positions_;                                 // d x n, as given
+    Eigen::MatrixXd places_;                                    // n (rounded up) x k: scaled and transformed
+    std::vector<std::pair<Eigen::Index, Eigen::Index>> twins_;  // at one place, not merged
+    Eigen::VectorXd errors_;                                    // scaled variances
+    Eigen::MatrixXd external_;                                  // n x q
+    Eigen::MatrixXd values_;                                    // n x c
+    Eigen::VectorXd centreGamma_;                               // generalised covariance: gamma(x_i - centre)
+    double level_ = 0;                                          // and its constant, max centreGamma_
 
     // Data as given: one entry a datum.
     std::vector<Eigen::Index> row_;  // its factorised datum, -1 = ignored

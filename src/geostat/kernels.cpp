@@ -1,0 +1,223 @@
+#include "kernels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "structure_kernel.h"
+#include "vector_math.h"
+
+namespace vlx::kernels {
+namespace {
+
+using Eigen::Index;
+
+/// Left-looking by blocks of four columns; two vectors of rows at a time, so that eight sums stay in
+/// registers.
+template <class T, int bytes>
+[[gnu::always_inline]] inline T choleskyBody(T* a, Index n, Index rows, Index leading) {
+    using V = typename Vectors<T, bytes>::Type;
+    constexpr Index lanes = kLanes<V>;
+    constexpr Index width = 4;
+    T lowest = n > 0 ? a[0] : T(1);
+    for (Index j = 0; j < n; j += width) {
+        const Index w = std::min(width, n - j);
+        // Sums over the columns already factorised. Missing columns of the last block repeat the first one.
+        const T* rowOf[width];
+        T* column[width];
+        for (Index c = 0; c < width; ++c) {
+            rowOf[c] = a + j + (c < w ? c : 0);
+            column[c] = a + (j + (c < w ? c : 0)) * leading;
+        }
+        for (Index i = j / (2 * lanes) * (2 * lanes); i < rows; i += 2 * lanes) {
+            V s00 = load<V>(column[0] + i), s01 = load<V>(column[0] + i + lanes);
+            V s10 = load<V>(column[1] + i), s11 = load<V>(column[1] + i + lanes);
+            V s20 = load<V>(column[2] + i), s21 = load<V>(column[2] + i + lanes);
+            V s30 = load<V>(column[3] + i), s31 = load<V>(column[3] + i + lanes);
+            for (Index k = 0; k < j; ++k) {
+                const V l0 = load<V>(a + i + k * leading), l1 = load<V>(a + i + lanes + k * leading);
+                const T r0 = rowOf[0][k * leading], r1 = rowOf[1][k * leading];
+                const T r2 = rowOf[2][k * leading], r3 = rowOf[3][k * leading];
+                s00 -= l0 * r0;
+                s01 -= l1 * r0;
+                s10 -= l0 * r1;
+                s11 -= l1 * r1;
+                s20 -= l0 * r2;
+                s21 -= l1 * r2;
+                s30 -= l0 * r3;
+                s31 -= l1 * r3;
+            }
+            store(column[0] + i, s00);
+            store(column[0] + i + lanes, s01);
+            if (w > 1) store(column[1] + i, s10), store(column[1] + i + lanes, s11);
+            if (w > 2) store(column[2] + i, s20), store(column[2] + i + lanes, s21);
+            if (w > 3) store(column[3] + i, s30), store(column[3] + i + lanes, s31);
+        }
+        // The diagonal block by hand.
+        T block[width][width], inverse[width];
+        for (Index c = 0; c < w; ++c)
+            for (Index b = 0; b <= c; ++b) {
+                T s = a[j + c + (j + b) * leading];
+                for (Index k = 0; k < b; ++k) s -= block[c][k] * block[b][k];
+                if (b < c) {
+                    block[c][b] = s * inverse[b];
+                } else {
+                    lowest = std::min(lowest, s);
+                    if (!(s > 0)) return s;
+                    block[c][c] = std::sqrt(s);
+                    inverse[c] = T(1) / block[c][c];
+                }
+            }
+        // The rows below it.
+        for (Index i = j / lanes * lanes; i < rows; i += lanes) {
+            V x[width];
+            for (Index c = 0; c < w; ++c) {
+                V s = load<V>(column[c] + i);
+                for (Index b = 0; b < c; ++b) s -= x[b] * block[c][b];
+                x[c] = s * inverse[c];
+                store(column[c] + i, x[c]);
+            }
+        }
+        for (Index c = 0; c < w; ++c)
+            for (Index b = 0; b <= c; ++b) a[j + c + (j + b) * leading] = block[c][b];
+    }
+    return lowest;
+}
+
+struct Columns {
+    const ModelColumns::Structure* structures;
+    std::size_t count;
+    const double* places;
+    Index leading, axes;
+    const double* point;
+    Index first, last;
+    bool semivariance;
+    double* out;
+};
+
+template <int bytes>
+[[gnu::always_inline]] inline void columnsBody(const Columns& c) {
+    using V = typename Vectors<double, bytes>::Type;
+    for (Index i = c.first / kLanes<V> * kLanes<V>; i < c.last; i += kLanes<V>) {
+        V squared{};
+        for (Index axis = 0; axis < c.axes; ++axis) {
+            const V d = load<V>(c.places + axis * c.leading + i) - c.point[axis];
+            squared += d * d;
+        }
+        V sum{};
+        for (std::size_t k = 0; k < c.count; ++k) {
+            const ModelColumns::Structure& s = c.structures[k];
+            sum += s.sill * structureValue<V>(s.type, squared * s.inverseSquaredRange, spread<V>(s.halfShape),
+                                              s.halfShape, c.semivariance);
+        }
+        store(c.out + i, sum);
+    }
+}
+
+// One instance for each instruction set.
+[[gnu::target("avx512f,avx512dq,avx512vl")]] double choleskyAvx512(double* a, Index n, Index rows,
+                                                                   Index leading) {
+    return choleskyBody<double, 64>(a, n, rows, leading);
+}
+[[gnu::target("avx2")]] double choleskyAvx2(double* a, Index n, Index rows, Index leading) {
+    return choleskyBody<double, 32>(a, n, rows, leading);
+}
+double choleskyBase(double* a, Index n, Index rows, Index leading) {
+    return choleskyBody<double, 16>(a, n, rows, leading);
+}
+[[gnu::target("avx512f,avx512dq,avx512vl")]] float choleskyAvx512(float* a, Index n, Index rows,
+                                                                  Index leading) {
+    return choleskyBody<float, 64>(a, n, rows, leading);
+}
+[[gnu::target("avx2")]] float choleskyAvx2(float* a, Index n, Index rows, Index leading) {
+    return choleskyBody<float, 32>(a, n, rows, leading);
+}
+float choleskyBase(float* a, Index n, Index rows, Index leading) {
+    return choleskyBody<float, 16>(a, n, rows, leading);
+}
+[[gnu::target("avx512f,avx512dq,avx512vl")]] void columnsAvx512(const Columns& c) { columnsBody<64>(c); }
+[[gnu::target("avx2")]] void columnsAvx2(const Columns& c) { columnsBody<32>(c); }
+void columnsBase(const Columns& c) { columnsBody<16>(c); }
+
+}  // namespace
+
+InstructionSet instructionSet() {
+    static const InstructionSet best = [] {
+        if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+            __builtin_cpu_supports("avx512vl"))
+            return InstructionSet::Avx512;
+        return __builtin_cpu_supports("avx2") ? InstructionSet::Avx2 : InstructionSet::Base;
+    }();
+    return best;
+}
+
+Index leadingDimension(Index rows) {
+    const Index rounded = (rows + 31) / 32 * 32;
+    return rounded % 64 == 0 ? rounded + 32 : rounded;
+}
+
+double cholesky(double* a, Index n, Index rows, Index leading, InstructionSet set) {
+    if (set == InstructionSet::Avx512) return choleskyAvx512(a, n, rows, leading);
+    if (set == InstructionSet::Avx2) return choleskyAvx2(a, n, rows, leading);
+    return choleskyBase(a, n, rows, leading);
+}
+
+float cholesky(float* a, Index n, Index rows, Index leading, InstructionSet set) {
+    if (set == InstructionSet::Avx512) return choleskyAvx512(a, n, rows, leading);
+    if (set == InstructionSet::Avx2) return choleskyAvx2(a, n, rows, leading);
+    return choleskyBase(a, n, rows, leading);
+}
+
+ModelColumns::ModelColumns(const VariogramModel& model) : model_(model) {
+    vectorised_ = true;
+    for (const VariogramStructure& s : model.structures) {
+        if (s.sill == 0) continue;
+        const bool stable = s.type == StructureType::Stable;
+        structures_.push_back({s.type, s.sill, 1 / (s.range * s.range), stable ? s.shape / 2 : s.shape});
+        if (!(s.range > 1e-100 && s.range < 1e100)) vectorised_ = false;
+        if (s.type == StructureType::Matern) {
+            closedSemivariance_ = false;
+            if (s.shape != 0.5 && s.shape != 1.5 && s.shape != 2.5) vectorised_ = false;
+        }
+    }
+}
+
+void ModelColumns::semivariances(const double* places, Index leading, Index axes, const double* point,
+                                 Index first, Index last, double* out) const {
+    evaluate(places, leading, axes, point, first, last, true, out);
+}
+
+void ModelColumns::covariances(const double* places, Index leading, Index axes, const double* point,
+                               Index first, Index last, double* out) const {
+    evaluate(places, leading, axes, point, first, last, false, out);
+}
+
+void ModelColumns::evaluate(const double* places, Index leading, Index axes, const double* point, Index first,
+                            Index last, bool semivariance, double* out) const {
+    if (vectorised_ && (closedSemivariance_ || !semivariance)) {
+        const Columns columns{structures_.data(),
+                              structures_.size(),
+                              places,
+                              leading,
+                              axes,
+                              point,
+                              first,
+                              last,
+                              semivariance,
+                              out};
+        const InstructionSet set = instructionSet();
+        if (set == InstructionSet::Avx512) return columnsAvx512(columns);
+        if (set == InstructionSet::Avx2) return columnsAvx2(columns);
+        return columnsBase(columns);
+    }
+    for (Index i = first; i < last; ++i) {
+        double squared = 0;
+        for (Index axis = 0; axis < axes; ++axis) {
+            const double d = places[axis * leading + i] - point[axis];
+            squared += d * d;
+        }
+        const double h = std::sqrt(squared);
+        out[i] = semivariance ? vlx::semivariance(model_, h) : vlx::covariance(model_, h);
+    }
+}
+
+}  // namespace vlx::kernels
