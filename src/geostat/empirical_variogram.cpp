@@ -17,6 +17,7 @@ struct CleanData {
     Eigen::VectorXd noise, weights;
     std::vector<Index> rows;
     Index skipped = 0;
+    int exponent = 0;  ///< values are those given divided by 2^exponent, noise by its square
 };
 
 CleanData clean(const Eigen::Ref<const Eigen::MatrixXd>& positions,
@@ -43,6 +44,19 @@ CleanData clean(const Eigen::Ref<const Eigen::MatrixXd>& positions,
     if (errorVariances.size() > 0) data.noise = errorVariances(data.rows);
     if (dataWeights.size() > 0) data.weights = dataWeights(data.rows);
     return data;
+}
+
+/// Divides by a power of two, which rounds nothing, so that fourth powers of the values neither overflow nor
+/// underflow.
+void scale(CleanData& data) {
+    if (data.values.size() == 0) return;
+    double size = (data.values.colwise().maxCoeff() - data.values.colwise().minCoeff()).maxCoeff();
+    if (data.noise.size() > 0) size = std::max(size, std::sqrt(data.noise.maxCoeff()));
+    if (!(size > 0) || !std::isfinite(size)) return;
+    data.exponent = std::ilogb(size);
+    const auto shift = [](int exponent) { return [exponent](double v) { return std::ldexp(v, exponent); }; };
+    data.values = data.values.unaryExpr(shift(-data.exponent)).eval();
+    if (data.noise.size() > 0) data.noise = data.noise.unaryExpr(shift(-2 * data.exponent)).eval();
 }
 
 /// Finds the class of a distance: -1 for none.
@@ -168,7 +182,8 @@ NoiseShape noiseShape(const CleanData& data, const Eigen::MatrixXd& centred,
     return shape;
 }
 
-/// Fills standard errors and nullCovariance. `rowWeights`: n x k, m_ia of the header.
+/// Fills standard errors and the null distribution; semivariances are still scaled. `rowWeights`: n x k, m_ia
+/// of the header.
 void addErrors(EmpiricalVariogram& result, const CleanData& data, const std::vector<ClassSums>& sums,
                const Eigen::MatrixXd& rowWeights, double relativeVariance) {
     const Index n = data.values.rows(), k = rowWeights.cols();
@@ -190,16 +205,33 @@ void addErrors(EmpiricalVariogram& result, const CleanData& data, const std::vec
                (s.weight * s.weight);
     };
     const Eigen::MatrixXd weighted = variances.asDiagonal() * scaled;
-    result.nullCovariance = 0.25 * shape.spread * relativeVariance * weighted.transpose() * weighted;
+    Eigen::MatrixXd covariance = 0.25 * shape.spread * relativeVariance * weighted.transpose() * weighted;
     for (Index b = 0; b < k; ++b) {
         const ClassSums& s = sums[static_cast<std::size_t>(b)];
         if (!(s.weight > 0)) continue;
-        result.nullCovariance(b, b) += relativeVariance * pairTerm(s, nugget);
+        covariance(b, b) += relativeVariance * pairTerm(s, nugget);
         VariogramBin& bin = result.bins[static_cast<std::size_t>(b)];
         const double g = std::max(0.0, bin.semivariance);
         const double shared = ((noise.array() + g) * scaled.col(b).array()).square().sum();
         bin.standardError = std::sqrt(relativeVariance * (0.25 * shape.spread * shared + pairTerm(s, g)));
     }
+    result.nullError = covariance.diagonal().cwiseSqrt();
+    const Eigen::VectorXd inverse =
+        result.nullError.unaryExpr([](double deviation) { return deviation > 0 ? 1 / deviation : 0.0; });
+    result.nullCorrelation = inverse.asDiagonal() * covariance * inverse.asDiagonal();
+}
+
+/// Back to the unit of the caller's values.
+void unscale(EmpiricalVariogram& result, int exponent) {
+    const auto back = [exponent](double v) { return std::ldexp(v, 2 * exponent); };
+    for (VariogramBin& bin : result.bins) {
+        bin.semivariance = back(bin.semivariance);
+        bin.noise = back(bin.noise);
+        bin.standardError = back(bin.standardError);
+    }
+    result.variance = back(result.variance);
+    result.meanNoise = back(result.meanNoise);
+    result.nullError = result.nullError.unaryExpr(back).eval();
 }
 
 }  // namespace
@@ -256,7 +288,8 @@ EmpiricalVariogram empiricalVariogram(const Eigen::Ref<const Eigen::MatrixXd>& p
     const bool matheron = options.estimator == VariogramEstimator::Matheron;
     const bool dowd = options.estimator == VariogramEstimator::Dowd;
     assert(matheron || dataWeights.size() == 0);
-    const CleanData data = clean(positions, values, errorVariances, dataWeights);
+    CleanData data = clean(positions, values, errorVariances, dataWeights);
+    scale(data);
     const Index n = data.positions.rows();
     const LagClasses classes(options.edges);
     const Index k = classes.count();
@@ -264,7 +297,8 @@ EmpiricalVariogram empiricalVariogram(const Eigen::Ref<const Eigen::MatrixXd>& p
     EmpiricalVariogram result;
     result.data = n;
     result.skipped = data.skipped;
-    result.nullCovariance = Eigen::MatrixXd::Zero(k, k);
+    result.nullError = Eigen::VectorXd::Zero(k);
+    result.nullCorrelation = Eigen::MatrixXd::Zero(k, k);
     for (std::size_t b = 0; b + 1 < options.edges.size(); ++b) {
         const double lower = options.edges[b], upper = options.edges[b + 1];
         const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -334,6 +368,7 @@ EmpiricalVariogram empiricalVariogram(const Eigen::Ref<const Eigen::MatrixXd>& p
     if (!any) result.status = VariogramStatus::NoPairs;
     const double relativeVariance = matheron ? 1 : dowd ? 5.44 / 2 : 2.885 / 2;
     addErrors(result, data, sums, rowWeights, relativeVariance);
+    unscale(result, data.exponent);
     return result;
 }
 

@@ -62,12 +62,15 @@ RemlLikelihood evaluate(const Prepared& data, const VariogramModel& model, bool 
     const Eigen::VectorXd inverseScale = scale.cwiseInverse();
     const Eigen::LLT<Eigen::MatrixXd> factor(inverseScale.asDiagonal() * k * inverseScale.asDiagonal());
     if (factor.info() != Eigen::Success) return result;
+    // Pivots of rounding size: coincident data without error have no density.
+    const Eigen::MatrixXd lower = factor.matrixL();
+    if (!(lower.diagonal().cwiseAbs2().minCoeff() > 1e-15 * std::max(1.0, static_cast<double>(n) / 8)))
+        return result;
     const Eigen::MatrixXd a = factor.matrixL().solve(inverseScale.asDiagonal() * data.drift);
     const Eigen::MatrixXd z = factor.matrixL().solve(inverseScale.asDiagonal() * data.values);
     Eigen::HouseholderQR<Eigen::MatrixXd> qr(a);
     const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(n, p);
     double logDeterminant = 2 * scale.array().log().sum();
-    const Eigen::MatrixXd lower = factor.matrixL();
     logDeterminant += 2 * lower.diagonal().array().log().sum();
     logDeterminant += 2 * qr.matrixQR().diagonal().head(p).array().abs().log().sum();
     const Eigen::MatrixXd projected = z - q * (q.transpose() * z);

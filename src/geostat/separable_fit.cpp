@@ -107,12 +107,13 @@ Solution Problem::solveSubsets() const {
 
 Space makeSpace(const FitOptions& options, const Classes& classes) {
     Space space;
+    const bool fast = options.search == FitSearch::Fast;
     for (std::size_t s = 0; s < options.structures.size(); ++s) {
         const FitStructure& structure = options.structures[s];
         space.fixed[s] = {1, structure.minShape};
         if (structure.type == StructureType::Linear) continue;
-        const double lower =
-            structure.minRange > 0 ? structure.minRange / classes.distanceScale : 1e-3 * classes.shortest;
+        const double lower = structure.minRange > 0 ? structure.minRange / classes.distanceScale
+                                                    : (fast ? 0.1 : 1e-3) * classes.shortest;
         const double upper = structure.maxRange > 0 ? structure.maxRange / classes.distanceScale : 20;
         if (lower < upper)
             space.variables.push_back({s, true, std::log(lower), std::log(upper)});
@@ -259,7 +260,7 @@ Solution searchGlobal(Problem& problem, const Space& space) {
 /// One structure of a class with a cheap grid: a geometric series of ranges, so that u^alpha is a product.
 Solution searchFast(Problem& problem, const Space& space, const Classes& classes) {
     if (space.variables.empty()) return problem.solve(space.fixed);
-    constexpr int ranges = 24, shapes = 8;
+    constexpr int ranges = 28, shapes = 8;
     Solution best;
     std::vector<double> x(space.variables.size());
     const bool freeShape = space.variables.size() == 2;
@@ -287,17 +288,39 @@ Solution searchFast(Problem& problem, const Space& space, const Classes& classes
             best = better(best, problem.solveColumns(space.at(x)));
         }
     }
-    const auto refine = [&](std::size_t v, double width, int steps) {
-        const Variable& variable = space.variables[v];
-        const std::vector<double> centre = coordinates(space, best);
-        best = better(best, golden(problem, space, centre, v, std::max(variable.lower, centre[v] - width),
-                                   std::min(variable.upper, centre[v] + width), steps));
-    };
+    // Golden section in the range; with a free shape, golden section in the shape over the best range of each
+    // (the two are strongly correlated), and the bounds of the shape, which it never reaches.
     const double rangeStep = rangePoints[1] - rangePoints[0];
-    refine(0, rangeStep, 8);
-    if (freeShape) {
-        refine(1, shapePoints[1] - shapePoints[0], 8);
-        refine(0, 0.5 * rangeStep, 8);
+    const auto bestRange = [&](const std::vector<double>& centre, int steps) {
+        return golden(problem, space, centre, 0, std::max(space.variables[0].lower, centre[0] - rangeStep),
+                      std::min(space.variables[0].upper, centre[0] + rangeStep), steps);
+    };
+    best = better(best, bestRange(coordinates(space, best), 8));
+    if (!freeShape) return best;
+    const std::vector<double> centre = coordinates(space, best);
+    const double shapeStep = shapePoints[1] - shapePoints[0];
+    double lower = std::max(space.variables[1].lower, centre[1] - shapeStep);
+    double upper = std::min(space.variables[1].upper, centre[1] + shapeStep);
+    const auto profile = [&](double shape) {
+        std::vector<double> at = coordinates(space, best);
+        at[1] = shape;
+        const Solution s = bestRange(at, 6);
+        best = better(best, s);
+        return s.sse;
+    };
+    if (lower == space.variables[1].lower) profile(lower);
+    if (upper == space.variables[1].upper) profile(upper);
+    constexpr double ratio = 0.6180339887498949;
+    double s = upper - ratio * (upper - lower), t = lower + ratio * (upper - lower);
+    double fs = profile(s), ft = profile(t);
+    for (int i = 0; i < 5; ++i) {
+        if (fs <= ft) {
+            upper = t, t = s, ft = fs;
+            fs = profile(s = upper - ratio * (upper - lower));
+        } else {
+            lower = s, s = t, fs = ft;
+            ft = profile(t = lower + ratio * (upper - lower));
+        }
     }
     return best;
 }

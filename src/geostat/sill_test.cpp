@@ -28,20 +28,20 @@ SillTest sillTest(const EmpiricalVariogram& variogram, double level) {
     }
     const double valueScale = gamma.cwiseAbs().maxCoeff();
     if (!(valueScale > 0)) return test;
+    gamma /= valueScale;
 
-    Eigen::MatrixXd covariance;
-    if (variogram.nullCovariance.rows() == static_cast<Eigen::Index>(variogram.bins.size())) {
-        covariance = variogram.nullCovariance(used, used);
+    Eigen::VectorXd deviation(k);
+    Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(k, k);
+    const Eigen::Index all = static_cast<Eigen::Index>(variogram.bins.size());
+    if (variogram.nullError.size() == all && variogram.nullCorrelation.rows() == all) {
+        deviation = variogram.nullError(used) / valueScale;
+        correlation = variogram.nullCorrelation(used, used);
     } else {
         const double mean = std::max(0.0, gamma.dot(pairs) / pairs.sum());
-        covariance = (2 * mean * mean * pairs.cwiseInverse()).asDiagonal();
+        deviation = mean * (2 * pairs.cwiseInverse()).cwiseSqrt();
     }
-    if (!covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0)) return test;
-    // Unit diagonal: classes of very different noise, and semivariances far from 1, factor equally well.
-    const Eigen::VectorXd deviation = covariance.diagonal().cwiseSqrt();
-    Eigen::MatrixXd correlation =
-        deviation.cwiseInverse().asDiagonal() * covariance * deviation.cwiseInverse().asDiagonal();
-    correlation.diagonal().array() += 1e-9;
+    if (!deviation.allFinite() || !correlation.allFinite() || !(deviation.minCoeff() > 0)) return test;
+    correlation.diagonal().array() += 1e-9;  // classes that repeat each other
     const Eigen::LLT<Eigen::MatrixXd> factor(correlation);
     if (factor.info() != Eigen::Success) return test;
     const auto whiten = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {

@@ -72,10 +72,11 @@ struct EmpiricalVariogram {
     VariogramStatus status = VariogramStatus::Ok;
     std::vector<VariogramBin> bins;  ///< all classes, in order, empty ones too
 
-    /// k x k: covariance of the classes' semivariances if the values were independent (pure nugget + errors),
-    /// the null hypothesis of sillTest() in variogram_fit.h. Rows of empty classes are 0. Formula at
-    /// empiricalVariogram().
-    Eigen::MatrixXd nullCovariance;
+    /// Standard deviations (k) and correlations (k x k) of the classes' semivariances if the values were
+    /// independent (pure nugget + errors), the null hypothesis of sillTest() in variogram_fit.h. 0 for empty
+    /// classes. Formula at empiricalVariogram().
+    Eigen::VectorXd nullError;
+    Eigen::MatrixXd nullCorrelation;
 
     double variance = 0;   ///< sample variance of the values, errors included, summed over channels
     double meanNoise = 0;  ///< mean error variance
@@ -99,11 +100,11 @@ struct EmpiricalVariogram {
 ///     Cov(a, b) = [ V/4 sum_i s_i^2 m_ia m_ib + [a = b] t sum_pairs w_ij^2 s_i s_j ] / (W_a W_b)
 /// with m_ia the weight of datum i's pairs in class a, W_a that of all its pairs, V = Var(|e|^2) / E(|e|^2)^2
 /// (2 for one Gaussian channel, estimated from the data's fourth moment, so heavy tails widen it) and t =
-/// tr(S^2) / tr(S)^2 for the covariance S of the channels (1 for one). `nullCovariance` takes for g the
-/// sample variance less the mean error variance, `standardError` of a class its own semivariance. The
-/// correlation of the field itself is not included: where ranges reach beyond a class the errors are lower
-/// bounds. The robust estimators' are multiplied by the root of their asymptotic relative variances 2.885/2
-/// (Cressie and Hawkins 1980) and 5.44/2 (delta method on the sample median).
+/// tr(S^2) / tr(S)^2 for the covariance S of the channels (1 for one). `nullError` and `nullCorrelation` take
+/// for g the sample variance less the mean error variance, `standardError` of a class its own semivariance.
+/// The correlation of the field itself is not included: where ranges reach beyond a class the errors are
+/// lower bounds. The robust estimators' are multiplied by the root of their asymptotic relative
+/// variances 2.885/2 (Cressie and Hawkins 1980) and 5.44/2 (delta method on the sample median).
 EmpiricalVariogram empiricalVariogram(
     const Eigen::Ref<const Eigen::MatrixXd>& positions, const Eigen::Ref<const Eigen::MatrixXd>& values,
     const EmpiricalVariogramOptions& options,
