@@ -135,6 +135,7 @@ TEST(DumpMemory, ClaimsAreRefusedBeforeMemoryIsTaken) {
 }
 
 TEST(DumpMemory, DamagedFilesNeverTakeMuch) {
+    const ThreadLimit oneThread(1);
     const TemporaryFolder folder;
     std::mt19937 random(11);
     TestDump dump = makeDump({0, 0, 11, 9}, mixedChannels(), [](int, int) { return 3; });
@@ -158,7 +159,7 @@ TEST(DumpMemory, DamagedFilesNeverTakeMuch) {
                              }
                          }));
     }
-    // No file can claim more than what its bytes might unpack to, in every thread.
+    // No file can claim more than what its bytes might unpack to.
     EXPECT_LT(worst, static_cast<std::int64_t>(whole.size()) * 1032 * 4);
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <random>
 
@@ -126,6 +127,7 @@ std::vector<unsigned char> fileBytes(const std::string& path) {
 }
 
 void writeBytes(const std::string& path, const std::vector<unsigned char>& bytes) {
+    std::remove(path.c_str());  // file systems flush a file that is overwritten, not one that is new
     std::ofstream file(path, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }
