@@ -70,7 +70,10 @@ Bsdf::Bsdf(const SurfaceParameters& s, const Vec3& wo, bool fromInside, const Al
     const Rgb entering = Rgb(1) - dielectricAlbedo(atO);
     const Rgb meanDielectric = dielectricAlbedo(mean);
     const Rgb rest{inverseRest(meanDielectric.x), inverseRest(meanDielectric.y), inverseRest(meanDielectric.z)};
-    diffuse_ = s.baseColour * entering * rest * (opaque * base_);
+    const Rgb full = s.baseColour * rest;
+    const Rgb body = Rgb{std::min(full.x, 1.f), std::min(full.y, 1.f), std::min(full.z, 1.f)} * entering *
+                     (opaque * base_);
+    diffuse_ = body * rest;
 
     // Smooth glass without a change of index neither bends nor spreads light.
     glassSmooth_ = smooth_ || std::abs(eta_ - 1) < 1e-3f;
@@ -80,11 +83,11 @@ Bsdf::Bsdf(const SurfaceParameters& s, const Vec3& wo, bool fromInside, const Al
 
     // Energy of each lobe towards wo: the probability of choosing it.
     const Rgb reflected = single * base_;
-    const Rgb body = s.baseColour * entering * (opaque * base_) + colour * ((1 - atO.whole) * base_);
+    const Rgb spread = body + colour * ((1 - atO.whole) * base_);
     const GlassSplit split = splitAt(cosO);
     const Rgb through = (split.reflected + split.transmitted) * (glass * base_);
-    albedo_ = Rgb(coatAlbedo_) + reflected + body + through;
-    probability_ = {coatAlbedo_, maxComponent(reflected), maxComponent(body), maxComponent(through)};
+    albedo_ = Rgb(coatAlbedo_) + reflected + spread + through;
+    probability_ = {coatAlbedo_, maxComponent(reflected), maxComponent(spread), maxComponent(through)};
     const float total = probability_[0] + probability_[1] + probability_[2] + probability_[3];
     for (float& p : probability_) p = total > 0 ? p / total : 0;
     onlyDelta_ = (probability_[kCoat] == 0 || coatSmooth_) && (probability_[kReflection] == 0 || smooth_) &&
