@@ -19,7 +19,8 @@ struct SurfaceParameters {
     Rgb specularColour{1, 1, 1};
     float clearcoat = 0;
     float clearcoatRoughness = 0;
-    const GlassTable* glassTable = nullptr;  ///< of this ior; without it rough glass loses a little energy
+    const AlbedoTable* albedoTable = nullptr;  ///< of this ior; required
+    const GlassTable* glassTable = nullptr;    ///< of this ior; without it rough glass loses a little energy
 };
 
 /// f |cos wi| and the density (per solid angle) with which sample() chooses wi, both without delta lobes.
@@ -40,21 +41,24 @@ struct BsdfSample {
 ///
 ///     f = coat + (1 - Ec(wo)) [ metallic and dielectric reflection + diffuse + glass ]
 ///
-/// - reflection: GGX, height-correlated Smith, Schlick's Fresnel term between f0 and f90; metals f0 = base
-///   colour; dielectrics f0 = ((ior-1)/(ior+1))^2 x specular x specularColour, f90 = specular. Energy lost to
-///   multiple scattering is returned by Kulla and Conty's lobe.
-/// - diffuse: base colour / pi x (1-Ed(wo)) (1-Ed(wi)) / (1 - mean Ed), Ed being the dielectric reflection's
-///   albedo: what is not reflected enters. Reciprocal, and a white surface returns exactly what it gets.
+/// - reflection: GGX, height-correlated Smith; Fresnel from f0 to f90 along Schlick's curve for metals (f0 =
+///   base colour) and along the exact one for dielectrics (f0 = ((ior-1)/(ior+1))^2 x specular x
+///   specularColour, f90 = specular). Energy lost to multiple scattering is returned by Kulla and Conty's lobe.
+/// - diffuse: c / pi x (1-Ed(wo)) (1-Ed(wi)) / (1 - mean Ed), Ed being the dielectric reflection's albedo: what
+///   is not reflected enters. Reciprocal. c = min(1, base colour / (1 - mean Ed)), so that the base colour is
+///   the diffuse reflectance that one sees beneath the reflection (as in Disney's and Cycles' models, which
+///   take nothing off it), as far as energy allows: a white surface returns exactly what it gets.
 /// - glass (weight (1-metallic) transmission): reflection and refraction by the exact Fresnel term, refraction
 ///   tinted by the base colour; rough glass is divided by its single-scattering albedo. The surface bounds a
 ///   solid: light refracts on entering and on leaving. What is carried is basic radiance L / n^2, n being the
 ///   index of the medium, which refraction leaves as it is; emission is given in it too.
-/// - coat: GGX with f0 = 0.04, Ec its albedo times the clearcoat factor. Scaling by the view direction only
+/// - coat: GGX of index 1.5, Ec its albedo times the clearcoat factor. Scaling by the view direction only
 ///   keeps energy for every base, at the price of reciprocity: f(wo, wi) has wo towards the camera.
 class Bsdf {
   public:
     /// `fromInside`: wo is on the back of the surface (matters to glass only).
-    Bsdf(const SurfaceParameters& surface, const Vec3& wo, bool fromInside, const AlbedoTable& table);
+    /// `coatTable`: of index 1.5.
+    Bsdf(const SurfaceParameters& surface, const Vec3& wo, bool fromInside, const AlbedoTable& coatTable);
 
     BsdfValue evaluate(const Vec3& wi) const;
     /// `direction` chooses within the lobe, `choice` the lobe.
@@ -70,7 +74,12 @@ class Bsdf {
   private:
     enum Lobe : std::size_t { kCoat, kReflection, kDiffuse, kGlass, kLobes };
 
-    BsdfValue reflection(const Ggx& ggx, float lambdaO, const Vec3& wi, const Rgb& f0, const Rgb& f90) const;
+    struct Microfacet;
+
+    Rgb baseFresnel(float cosH) const;
+    float coatFresnel(float cosH) const;
+    BsdfValue baseReflection(const Vec3& wi) const;
+    BsdfValue coatReflection(const Vec3& wi) const;
     BsdfValue diffuse(float cosI) const;
     BsdfValue glass(const Vec3& wi) const;
     Rgb dielectricAlbedo(const Albedo& a) const;
@@ -80,7 +89,8 @@ class Bsdf {
         float reflectProbability;
     };
     GlassSplit splitAt(float cosH) const;
-    BsdfSample sampleReflection(float alpha, const Rgb& f0, const Rgb& f90, Vec2 u, Lobe lobe) const;
+    BsdfSample mirror(const Rgb& weight) const;
+    BsdfSample sampleMicrofacet(float alpha, Vec2 u) const;
     BsdfSample sampleGlass(Vec2 u, float choice) const;
     BsdfSample finish(const Vec3& wi) const;
 
@@ -94,18 +104,21 @@ class Bsdf {
     bool glassSmooth_;
     bool onlyDelta_;
 
-    float coat_;         ///< clearcoat factor
-    float coatAlbedo_;
-    float base_;         ///< 1 - coatAlbedo_
-    Rgb f0_, f90_;       ///< of metal and opaque dielectric together, weighted by how much of each there is
-    Rgb multiple_;       ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
-    Rgb dielectricF0_;   ///< of the dielectric alone, unweighted
+    float coat_;  ///< clearcoat factor
+    float coatAlbedo_ = 0;
+    float base_;               ///< 1 - coatAlbedo_
+    float metal_;              ///< how much of each there is: metal,
+    float opaque_;             ///< opaque dielectric
+    Rgb metalF0_;
+    Rgb dielectricF0_;
     float dielectricF90_;
-    Rgb dielectricMultiple_;  ///< Kulla and Conty's factor of the dielectric alone
-    Rgb diffuse_;        ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
-    float glassWeight_;  ///< includes the multiple-scattering compensation
+    Rgb dielectricMultiple_;   ///< Kulla and Conty's factor of the dielectric
+    Rgb multiple_;             ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
+    Rgb diffuse_;              ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
+    float glassWeight_;        ///< includes the multiple-scattering compensation
     Rgb glassTint_;
-    float eta_;
+    float ior_;
+    float eta_;                ///< far side over near side
     float exactF0_;
     AlbedoTable::Row row_;
     Rgb albedo_;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <limits>
 
 #include "scene_loader.h"
@@ -30,14 +31,23 @@ void setBounds(Scene& scene) {
     }
 }
 
-void setGlassTables(Scene& scene) {
+/// The index of the table of `ior` among `tables`, which grow when there is none.
+template <class Table>
+int tableOf(std::vector<Table>& tables, float ior) {
+    const auto found = std::ranges::find_if(tables, [&](const Table& t) { return t.ior() == ior; });
+    if (found == tables.end()) {
+        tables.emplace_back(ior);
+        return static_cast<int>(tables.size()) - 1;
+    }
+    return static_cast<int>(found - tables.begin());
+}
+
+void setTables(Scene& scene) {
+    tableOf(scene.albedoTables, 1.5f);
     for (Material& material : scene.materials) {
-        if (!material.transmissive() || square(material.roughness) < kSmoothAlpha) continue;
-        const auto& tables = scene.glassTables;
-        std::size_t i = 0;
-        while (i < tables.size() && tables[i].ior() != material.ior) ++i;
-        if (i == tables.size()) scene.glassTables.emplace_back(material.ior);
-        material.glassTable = static_cast<int>(i);
+        material.albedoTable = tableOf(scene.albedoTables, material.ior);
+        if (material.transmissive() && square(material.roughness) >= kSmoothAlpha)
+            material.glassTable = tableOf(scene.glassTables, material.ior);
     }
 }
 
@@ -104,7 +114,7 @@ Light meshLight(const Scene& scene, std::uint32_t index) {
 
 void completeScene(Scene& scene) {
     setBounds(scene);
-    setGlassTables(scene);
+    setTables(scene);
     for (std::uint32_t i = 0; i < scene.worldShapes; ++i) {
         if (!scene.materials[scene.shapes[i].material].emissive()) continue;
         scene.shapes[i].light = static_cast<std::int32_t>(scene.lights.size());

@@ -22,21 +22,25 @@ Vec2 quadraturePoint(std::uint32_t k) {
     return {unitFloat(p.x) + half, unitFloat(p.y) + half};
 }
 
-Albedo integrateReflection(float cosTheta, float roughness) {
+Albedo integrateReflection(float cosTheta, float roughness, float ior) {
     const Ggx ggx{square(roughness)};
-    if (ggx.alpha < kSmoothAlpha) return {1, schlickWeight(cosTheta)};
+    const float f0 = normalReflectance(ior);
+    if (ggx.alpha < kSmoothAlpha) return {1, schlickWeight(cosTheta), dielectricWeight(cosTheta, ior, f0)};
     const Vec3 wo = directionAt(cosTheta);
     const float lambdaO = ggx.lambda(wo);
-    double whole = 0, grazing = 0;
+    double whole = 0, conductor = 0, dielectric = 0;
     for (std::uint32_t k = 0; k < kPoints; ++k) {
         const Vec3 h = ggx.sampleVisible(wo, quadraturePoint(k));
         const Vec3 wi = reflected(wo, h);
         if (wi.z <= 0) continue;
         const float weight = (1 + lambdaO) / (1 + lambdaO + ggx.lambda(wi));  // G2 / G1
+        const float cosH = dot(wo, h);
         whole += weight;
-        grazing += weight * schlickWeight(dot(wo, h));
+        conductor += weight * schlickWeight(cosH);
+        dielectric += weight * dielectricWeight(cosH, ior, f0);
     }
-    return {static_cast<float>(whole / kPoints), static_cast<float>(grazing / kPoints)};
+    return {static_cast<float>(whole / kPoints), static_cast<float>(conductor / kPoints),
+            static_cast<float>(dielectric / kPoints)};
 }
 
 float integrateGlass(float cosTheta, float roughness, float eta) {
@@ -72,28 +76,34 @@ Position locate(float coordinate, std::size_t size) {
 
 }  // namespace
 
-AlbedoTable::AlbedoTable() {
+AlbedoTable::AlbedoTable(float ior) : ior_(ior) {
     parallelFor(0, static_cast<std::int64_t>(kSize), [&](std::int64_t row) {
         const auto i = static_cast<std::size_t>(row);
         const float roughness = static_cast<float>(i) / static_cast<float>(kSize - 1);
         for (std::size_t j = 0; j < kSize; ++j)
-            cells_[i][j] = integrateReflection(nodeCosine(j, kSize), roughness);
+            cells_[i][j] = integrateReflection(nodeCosine(j, kSize), roughness, ior);
         // Mean = 2 integral of albedo mu dmu = 4 integral of albedo(s^2) s^3 ds, s = sqrt(mu), of the table's
         // own piecewise linear interpolant: three-point Gauss is exact (degree 4 in s).
-        double whole = 0, grazing = 0;
+        constexpr std::array<std::array<double, 2>, 3> gauss{
+            {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
+        Albedo mean{0, 0, 0};
         for (std::size_t j = 0; j + 1 < kSize; ++j) {
-            constexpr std::array<std::array<double, 2>, 3> gauss{
-                {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
             for (const auto& [t, w] : gauss) {
                 const double s = (static_cast<double>(j) + t) / (kSize - 1);
-                const double weight = 4 * s * s * s * w / (kSize - 1);
-                const Albedo &a = cells_[i][j], &b = cells_[i][j + 1];
-                whole += weight * ((1 - t) * a.whole + t * b.whole);
-                grazing += weight * ((1 - t) * a.grazing + t * b.grazing);
+                const auto share = static_cast<float>(t);
+                mean = mean + (cells_[i][j] * (1 - share) + cells_[i][j + 1] * share) *
+                                  static_cast<float>(4 * s * s * s * w / (kSize - 1));
             }
         }
-        means_[i] = {static_cast<float>(whole), static_cast<float>(grazing)};
+        means_[i] = mean;
     });
+    constexpr int steps = 512;
+    double sum = 0;
+    for (int k = 0; k < steps; ++k) {
+        const float mu = (static_cast<float>(k) + 0.5f) / steps;
+        sum += 2 * mu * dielectricWeight(mu, ior, normalReflectance(ior)) / steps;
+    }
+    meanWeight_ = static_cast<float>(sum);
 }
 
 AlbedoTable::Row AlbedoTable::row(float roughness) const {

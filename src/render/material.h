@@ -42,6 +42,7 @@ struct Material {
     float alphaCutoff = 0.5f;
     bool doubleSided = false;
 
+    int albedoTable = 0;  ///< index into the scene's tables
     /// Index into the scene's glass tables, -1 when not rough transmissive.
     int glassTable = -1;
 

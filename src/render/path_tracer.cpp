@@ -100,7 +100,7 @@ PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
         const SurfaceParameters surface = surfaceParameters(scene_, point);
         const Frame frame(point.shadingNormal);
         const Vec3 wo = frame.toLocal(-ray.direction);
-        const Bsdf bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, point.fromBehind, scene_.albedoTable);
+        const Bsdf bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, point.fromBehind, scene_.albedoTables[0]);
         if (featuresPending && (bsdf.hasSmoothLobe() || emits)) {
             featuresPending = false;
             result.normal = point.shadingNormal;

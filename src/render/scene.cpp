@@ -124,7 +124,7 @@ Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triang
                         .rgb;
     }
     if (material.clearcoat > 0)
-        emission *= 1 - material.clearcoat * (0.04f + 0.96f * schlickWeight(cosTheta));
+        emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
     return emission;
 }
 
@@ -191,6 +191,7 @@ SurfaceParameters surfaceParameters(const Scene& scene, const SurfacePoint& poin
     if (m.clearcoatTexture) s.clearcoat *= sampled(m.clearcoatTexture).rgb.x;
     s.clearcoatRoughness = m.clearcoatRoughness;
     if (m.clearcoatRoughnessTexture) s.clearcoatRoughness *= sampled(m.clearcoatRoughnessTexture).rgb.y;
+    s.albedoTable = &scene.albedoTables[static_cast<std::size_t>(m.albedoTable)];
     if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
     return s;
 }

@@ -77,7 +77,7 @@ struct Scene {
 
     std::vector<Material> materials;
     std::vector<Texture> textures;
-    AlbedoTable albedoTable;
+    std::vector<AlbedoTable> albedoTables;  ///< one for each index of refraction; the first is of 1.5
     std::vector<GlassTable> glassTables;
 
     std::vector<Camera> cameras;
