@@ -6,6 +6,7 @@
 #include "progress_bar.h"
 #include "tool_main.h"
 #include "variolux/dump/info.h"
+#include "variolux/dump/points.h"
 #include "variolux/dump/stack.h"
 
 namespace {
@@ -91,6 +92,36 @@ struct StackCommand {
     }
 };
 
+struct SampleCommand {
+    std::string image;
+    std::string dump;
+    vlx::PointOptions options;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Sample an image at a few Sobol points, to see what kriging makes of them: the paper's figure "
+            "1.");
+        app.footer(
+            "Example:\n"
+            "  vlx-pack sample picture.png -o points.exr --points 64\n"
+            "  vlx-krige points.exr -o kriged.exr --whole-image --no-colour-distance");
+        app.add_option("IMAGE", image, "A flat image with R, G, B")->required();
+        app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
+        app.add_option("--points", options.points, "How many")
+            ->check(CLI::Range(1, 1 << 20))
+            ->capture_default_str();
+        app.add_flag("--scramble", options.scramble, "Randomise the points (Owen scrambling)");
+        app.add_option("--seed", options.seed, "Of the scrambling")
+            ->needs("--scramble")
+            ->capture_default_str();
+    }
+
+    int run() const {
+        vlx::sampleAtPoints(image, dump, options);
+        return vlx::kDone;
+    }
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -99,9 +130,15 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     InfoCommand info;
     StackCommand stack;
+    SampleCommand sample;
     CLI::App* infoApp = app.add_subcommand("info");
     CLI::App* stackApp = app.add_subcommand("stack");
+    CLI::App* sampleApp = app.add_subcommand("sample");
     info.bind(*infoApp);
     stack.bind(*stackApp);
-    return vlx::runTool(argc, argv, app, [&] { return infoApp->parsed() ? info.run() : stack.run(); });
+    sample.bind(*sampleApp);
+    return vlx::runTool(argc, argv, app, [&] {
+        if (infoApp->parsed()) return info.run();
+        return stackApp->parsed() ? stack.run() : sample.run();
+    });
 }
