@@ -1,7 +1,6 @@
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
-#include <map>
 #include <string>
 
 #include "progress_bar.h"
@@ -34,26 +33,21 @@ struct Options {
 };
 
 void bind(CLI::App& app, Options& o) {
-    const std::map<std::string, Method> methods = {
-        {"paper", Method::Paper}, {"mean", Method::Mean}, {"gaussian", Method::Gaussian}};
-    app.add_option("dump", o.dump, "Sample dump (deep OpenEXR) to read")->required()->option_text("DUMP");
+    app.add_option("DUMP", o.dump, "Sample dump (deep OpenEXR) of any renderer")->required();
     app.add_option("-o,--output", o.image,
-                   "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev")
-        ->required()
-        ->option_text("IMAGE");
-    auto* method =
-        app.add_option("--method", o.method,
-                       "paper: kriging by region (Yue and Nishita); mean: plain average of each pixel's "
-                       "samples; gaussian: the average, Gaussian filtered")
-            ->transform(CLI::CheckedTransformer(methods))
-            ->option_text("paper|mean|gaussian [paper]");
-    app.add_option("--sigma", o.sigma, "Gaussian filter: standard deviation in pixels")
+                   "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
+                   "deviation of the error of R, G, B)")
+        ->required();
+    vlx::addChoice(app, "--method", o.method,
+                   {{"paper", Method::Paper}, {"mean", Method::Mean}, {"gaussian", Method::Gaussian}},
+                   "paper: kriging by region (Yue and Nishita); mean: plain average of each pixel's samples; "
+                   "gaussian: the average, Gaussian filtered (no layer stddev)");
+    app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
         ->check(CLI::PositiveNumber)
-        ->option_text("PIXELS [1]")
-        ->needs(method);
+        ->capture_default_str();
     auto* region = app.add_option("--region", o.paper.regionSize, "paper: side of a region in pixels")
                        ->check(CLI::Range(1, 64))
-                       ->option_text("PIXELS [4]");
+                       ->capture_default_str();
     app.add_flag("--whole-image", o.wholeImage,
                  "paper: the whole image is one region (for a few samples scattered over an image)")
         ->excludes(region);
@@ -61,14 +55,20 @@ void bind(CLI::App& app, Options& o) {
                  "paper: distance on the image plane only, to show what the colour distance does");
     app.add_flag(
         "--diagnostics", o.diagnostics,
-        "Also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) and "
-        "IMAGE.json with everything about each region");
+        "paper: also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) "
+        "and OUTPUT.json with everything about each region");
     app.add_flag("--half", o.half, "Write 16-bit channels");
     app.add_flag("--json", o.json, "Print the report as JSON on standard output");
     app.add_flag("-q,--quiet", o.quiet, "Print nothing but errors");
-    app.add_option("--threads", o.threads, "Threads to use; pixels do not depend on it")
+    app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
         ->check(CLI::Range(0, 1024))
-        ->option_text("N [all]");
+        ->capture_default_str();
+    app.footer(
+        "Examples:\n"
+        "  vlx-krige samples.exr -o image.exr\n"
+        "  vlx-krige samples.exr -o blurred.exr --method gaussian --sigma 1.5\n"
+        "Samples that are not finite are left out and counted. Regions that cannot be kriged\n"
+        "get their mean and are counted.");
 }
 
 vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
@@ -136,7 +136,6 @@ int main(int argc, char** argv) {
         "Removes the noise of a path-traced image by kriging its samples, and says how accurate the result "
         "is.",
         "vlx-krige");
-    app.footer("Example: vlx-krige samples.exr -o image.exr");
     Options options;
     bind(app, options);
     return vlx::runTool(argc, argv, app, [&] { return run(options); });

@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "run_tool.h"
+#include "temporary_folder.h"
+#include "variolux/base/image_io.h"
+#include "variolux/dump/writer.h"
+
+namespace vlx {
+namespace {
+
+const std::string kDump = VLX_TESTDATA "/dumps/tungsten_cornell.exr";
+
+ToolRun krige(const std::vector<std::string>& arguments) { return runTool("vlx-krige", arguments); }
+
+TEST(VlxKrige, DefaultsGiveAnImageWithItsError) {
+    const TemporaryFolder folder;
+    const ToolRun run = krige({kDump, "-o", folder / "out.exr"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(run.out, "");
+    EXPECT_NE(run.err.find("regions: "), std::string::npos);
+    const Image image = readImage(folder / "out.exr");
+    for (const char* channel : {"R", "G", "B", "stddev.R", "stddev.G", "stddev.B"})
+        EXPECT_GE(image.channel(channel), 0) << channel;
+    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+    EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(VlxKrige, SamePixelsForAnyNumberOfThreads) {
+    const TemporaryFolder folder;
+    for (const char* method : {"paper", "mean", "gaussian"}) {
+        Image first;
+        for (const char* threads : {"1", "2", "8"}) {
+            ASSERT_EQ(krige({kDump, "-o", folder / "out.exr", "--method", method, "--threads", threads, "-q"})
+                          .exitCode,
+                      0);
+            const Image image = readImage(folder / "out.exr");
+            if (first.pixels.empty()) first = image;
+            EXPECT_EQ(image.pixels, first.pixels) << method << " " << threads;
+        }
+    }
+}
+
+TEST(VlxKrige, DiagnosticsAreLayersAndJson) {
+    const TemporaryFolder folder;
+    const ToolRun run = krige({kDump, "-o", folder / "out.exr", "--diagnostics", "--json"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const auto report = nlohmann::json::parse(run.out);
+    const auto document = nlohmann::json::parse(std::ifstream(folder / "out.exr.json"));
+    EXPECT_EQ(document["report"]["samples"], report["samples"]);
+    std::int64_t regions = 0;
+    for (const auto& [outcome, count] : report["regions"].items()) regions += count.get<std::int64_t>();
+    EXPECT_EQ(static_cast<std::int64_t>(document["regions"].size()), regions);
+    const Image image = readImage(folder / "out.exr");
+    for (const char* layer : {"nugget", "sill", "range", "exponent", "errorVariance", "outcome"})
+        EXPECT_GE(image.channel(std::string("diagnostics.") + layer), 0) << layer;
+}
+
+TEST(VlxKrige, BadUsageIsExitTwo) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out.exr";
+    for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
+                                                      {kDump},
+                                                      {kDump, "-o"},
+                                                      {kDump, "-o", out, "--method"},
+                                                      {kDump, "-o", out, "--method", "magic"},
+                                                      {kDump, "-o", out, "--sigma", "0"},
+                                                      {kDump, "-o", out, "--sigma"},
+                                                      {kDump, "-o", out, "--region", "0"},
+                                                      {kDump, "-o", out, "--region", "8", "--whole-image"},
+                                                      {kDump, "-o", out, "--method", "mean", "--diagnostics"},
+                                                      {kDump, "-o", out, "--threads", "-1"},
+                                                      {kDump, "-o", out, "--nonsense"}}) {
+        const ToolRun run = krige(arguments);
+        std::string line;
+        for (const auto& argument : arguments) line += " " + argument;
+        EXPECT_EQ(run.exitCode, 2) << line;
+        EXPECT_TRUE(run.err.starts_with("vlx-krige: ")) << line << "\n" << run.err;
+    }
+    EXPECT_EQ(folder.entries(), 0);
+}
+
+TEST(VlxKrige, FailuresAreExitOneNameTheFileAndLeaveNoOutput) {
+    const TemporaryFolder folder;
+    const TemporaryFolder target;
+    std::ofstream(folder / "text.exr") << "not an image";
+    Image flat({0, 0, 4, 4}, {"R", "G", "B"});
+    writeImage(folder / "flat.exr", flat);
+    std::filesystem::copy_file(kDump, folder / "truncated.exr");
+    std::filesystem::resize_file(folder / "truncated.exr", std::filesystem::file_size(kDump) * 2 / 3);
+    for (const char* name : {"missing.exr", "text.exr", "flat.exr", "truncated.exr"}) {
+        const ToolRun run = krige({folder / name, "-o", target / "out.exr"});
+        EXPECT_EQ(run.exitCode, 1) << name;
+        EXPECT_NE(run.err.find(name), std::string::npos) << run.err;
+        EXPECT_EQ(target.entries(), 0) << name;
+    }
+    // A folder that is not there, and a full disk.
+    EXPECT_EQ(krige({kDump, "-o", target / "no/out.exr"}).exitCode, 1);
+    EXPECT_EQ(runTool("vlx-krige", {kDump, "-o", target / "out.exr"}, {.fileSizeLimit = 2000}).exitCode, 1);
+    EXPECT_EQ(target.entries(), 0);
+}
+
+TEST(VlxKrige, NonFiniteSamplesAreDroppedAndCounted) {
+    const TemporaryFolder folder;
+    SampleBand band{0, 0, 4, 4, {0}, {"R", "G", "B"}, {}};
+    band.values.assign(3, {});
+    for (int p = 0; p < 16; ++p) {
+        for (int s = 0; s < 4; ++s)
+            for (auto& channel : band.values)
+                channel.push_back(p == 5 && s == 1   ? NAN
+                                  : p == 9 && s == 0 ? INFINITY
+                                                     : 0.5f + 0.1f * static_cast<float>(s));
+        band.offsets.push_back(band.values[0].size());
+    }
+    DumpHeader header;
+    header.data = header.display = {0, 0, 4, 4};
+    for (const auto& name : band.channels) header.channels.push_back({name, ChannelType::Float});
+    DumpWriter writer(folder / "a.exr", header);
+    writer.write(band);
+    writer.close();
+    const ToolRun run = krige({folder / "a.exr", "-o", folder / "out.exr", "--json"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(nlohmann::json::parse(run.out)["droppedSamples"], 2);
+    for (const float value : readImage(folder / "out.exr").pixels) EXPECT_TRUE(std::isfinite(value));
+}
+
+}  // namespace
+}  // namespace vlx
