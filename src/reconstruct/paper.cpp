@@ -130,11 +130,12 @@ System assemble(const RegionData& data, const VariogramModel& model, const Momen
 /// diagonal (a singular value lies beyond it, and is left out), and the stable model fitted to it; near the
 /// origin it matters most, hence the weights.
 VariogramFit fitStableModel(const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours,
-                            const Eigen::VectorXd& errors, const Window& pixels) {
+                            const Eigen::VectorXd& errors, const Window& pixels, bool nugget) {
     EmpiricalVariogramOptions classes;
     classes.edges = uniformEdges(std::hypot(pixels.width, pixels.height), kDistanceClasses);
     FitOptions options;
     options.structures = {{.type = StructureType::Stable, .minShape = kMinExponent, .maxShape = 2}};
+    options.nugget = nugget;
     options.weights = FitWeights::PairsPerSquaredDistance;
     options.search = FitSearch::Fast;
     return fitVariogram(empiricalVariogram(positions, colours, classes, errors), options);
@@ -234,7 +235,9 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     diagnostics.colourScale = k;
     const Eigen::MatrixXd differences = data.means.leftCols(kColours).rowwise() - moments.mean.head(kColours);
 
-    const VariogramFit fit = fitStableModel(data.positions, differences, moments.errors, data.pixels);
+    // Samples of the whole image with unknown errors are taken to be exact: nothing is filtered out.
+    const bool exact = options.regionSize == 0 && !data.varianceKnown;
+    const VariogramFit fit = fitStableModel(data.positions, differences, moments.errors, data.pixels, !exact);
     if (!fit.ok() && fit.status != FitStatus::Zero) {
         useMean(estimate, data, moments, RegionOutcome::FitFailed);
         return estimate;
@@ -242,6 +245,13 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     if (fit.status == FitStatus::Zero || fit.model.sill() == 0) {
         useMean(estimate, data, moments, RegionOutcome::NoStructure);
         return estimate;
+    }
+    if (!data.varianceKnown && fit.model.nugget > 0) {
+        // One sample a cell: what does not correlate with its neighbours is taken for noise.
+        RegionData noisy = data;
+        noisy.sampleVariance.head(kColours) = (fit.model.nugget / spread * moments.spread).matrix();
+        noisy.varianceKnown = true;
+        return krigeRegion(noisy, options);
     }
     diagnostics.nugget = fit.model.nugget;
     diagnostics.sill = fit.model.structures.front().sill;

@@ -191,6 +191,16 @@ TEST(KrigeRegion, HardRegionsStayFinite) {
     }
 }
 
+TEST(KrigeRegion, TakesTheNuggetForNoiseWhereThereIsOneSampleAPixel) {
+    // Noise of standard deviation 0.3 on a constant: the estimates must vary much less than the samples.
+    double squares = 0;
+    for (unsigned seed = 1; seed <= 50; ++seed) {
+        const RegionEstimate estimate = krigeRegion(gather(ramp(1, 0.3, seed, 0)), {});
+        squares += (estimate.values.col(0).array() - 2).square().sum() / (16 * 50);
+    }
+    EXPECT_LT(squares, 0.5 * 0.09);
+}
+
 TEST(PaperOptions, NameTheBrokenConstraint) {
     EXPECT_FALSE(PaperOptions{}.validate());
     EXPECT_TRUE(PaperOptions{.regionSize = -1}.validate());

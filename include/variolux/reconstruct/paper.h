@@ -51,6 +51,9 @@ struct RegionEstimate {
 ///    factorised once; a pixel's estimate is the mean over its cells of the kriged field (a block target).
 ///    The nugget is variation between cells that is no noise: a pixel contains that of its own cells.
 ///
+/// Where no pixel holds two samples their errors are unknown: the fitted nugget is then taken for noise,
+/// except with the whole image as region, whose samples count as exact (the paper's figure 1).
+///
 /// A region that cannot be kriged gets its mean; `diagnostics.outcome` says why. Never throws for numerical
 /// reasons; every value returned is finite.
 RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options);
