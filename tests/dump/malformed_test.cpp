@@ -242,6 +242,13 @@ TEST_F(Malformed, LyingAttributeSizes) {
         }
 }
 
+TEST_F(Malformed, OtherVersionsOfDeepData) {
+    const Victim victim(DumpCompression::Zips);
+    auto bytes = victim.bytes;
+    put(bytes, victim.attribute("version", "int"), std::int32_t{2});
+    EXPECT_NE(outcome(bytes).find("version 2"), std::string::npos);
+}
+
 TEST_F(Malformed, NotADumpAtAll) {
     EXPECT_NE(outcome({}).find("expected an OpenEXR file"), std::string::npos);
     EXPECT_NE(outcome(std::vector<unsigned char>(1000, 0)).find("expected an OpenEXR file"),
