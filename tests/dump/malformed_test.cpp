@@ -9,6 +9,7 @@
 
 #include "../base/temporary_folder.h"
 #include "exr_header.h"
+#include "little_endian.h"
 #include "openexr_files.h"
 #include "test_dumps.h"
 #include "variolux/base/error.h"
@@ -240,6 +241,32 @@ TEST_F(Malformed, LyingAttributeSizes) {
                 EXPECT_NE(message.find("claims"), std::string::npos) << name << ": " << message;
             }
         }
+}
+
+// Chunks that share their bytes: together they would claim many times the file.
+TEST_F(Malformed, OverlappingChunks) {
+    const Victim victim(DumpCompression::None);
+    auto bytes = victim.bytes;
+    const std::uint64_t perSample = victim.header.bytesPerSample;
+    const auto samples = static_cast<std::uint32_t>(20'000 / perSample);
+    for (int row = 0; row < kWindow.height; ++row) {
+        put(bytes, victim.table(row), std::uint64_t{bytes.size()});
+        append(bytes, std::int32_t{victim.header.part});
+        append(bytes, std::int32_t{kWindow.y + row});
+        append(bytes, std::uint64_t{4 * kWindow.width});
+        append(bytes, samples * perSample);
+        append(bytes, samples * perSample);
+        for (int x = 0; x < kWindow.width; ++x) append(bytes, samples);
+    }
+    bytes.resize(bytes.size() + 20'000);
+    EXPECT_NE(outcome(bytes).find("overlap"), std::string::npos) << outcome(bytes);
+}
+
+TEST_F(Malformed, OtherVersionsOfDeepData) {
+    const Victim victim(DumpCompression::Zips);
+    auto bytes = victim.bytes;
+    put(bytes, victim.attribute("version", "int"), std::int32_t{2});
+    EXPECT_NE(outcome(bytes).find("version 2"), std::string::npos);
 }
 
 TEST_F(Malformed, NotADumpAtAll) {

@@ -12,6 +12,7 @@
 
 #include "../base/temporary_folder.h"
 #include "exr_header.h"
+#include "little_endian.h"
 #include "test_dumps.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
@@ -131,6 +132,41 @@ TEST(DumpMemory, ClaimsAreRefusedBeforeMemoryIsTaken) {
         EXPECT_LT(
             peakWith(static_cast<std::size_t>(found - whole.begin()) + pattern.size(), &twoGigabytes, 4),
             300'000);
+    }
+}
+
+// A chunk whose numbers all agree with each other, on two gigabytes of samples in ten bytes.
+TEST(DumpMemory, ConsistentLiesAreRefusedToo) {
+    const TemporaryFolder folder;
+    for (const DumpCompression compression :
+         {DumpCompression::None, DumpCompression::Rle, DumpCompression::Zips}) {
+        TestDump dump = makeDump({0, 0, 11, 9}, mixedChannels(), [](int, int) { return 3; });
+        dump.header.compression = compression;
+        writeDump(folder / "a.exr", dump);
+        auto bytes = fileBytes(folder / "a.exr");
+        const FileHeader header = decodeHeader("a.exr", bytes, bytes.size()).value();
+
+        const auto samples = static_cast<std::uint32_t>(2'000'000'000 / header.bytesPerSample);
+        Bytes counts;
+        for (int x = 0; x < 11; ++x) append(counts, samples);
+        Packer packer(compression);
+        const auto packed = packer.pack(counts);
+        const std::uint64_t end = bytes.size();
+        append(bytes, std::int32_t{header.part});
+        append(bytes, std::int32_t{0});
+        append(bytes, std::uint64_t{packed.size()});
+        append(bytes, std::uint64_t{10});
+        append(bytes, std::uint64_t{samples} * header.bytesPerSample);
+        bytes.insert(bytes.end(), packed.begin(), packed.end());
+        bytes.insert(bytes.end(), 10, 0);
+        std::memcpy(bytes.data() + header.chunkTable, &end, 8);
+        writeBytes(folder / "a.exr", bytes);
+
+        std::string message;
+        const std::int64_t needed =
+            peakOf([&] { message = errorOf([&] { DumpReader(folder / "a.exr").read(0, 1); }); });
+        EXPECT_NE(message.find("10 bytes cannot unpack to"), std::string::npos) << message;
+        EXPECT_LT(needed, 300'000);
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <thread>
 
 #include "../base/temporary_folder.h"
 #include "test_dumps.h"
@@ -77,6 +78,20 @@ TEST(Dump, RowsInAnyOrderAndAnyNumber) {
     const DumpReader reader(folder / "a.exr");
     for (const auto& [row, rows] : {std::pair{30, 1}, {0, 1}, {12, 9}, {3, 28}, {12, 9}, {0, 31}})
         expectSame(rowsOf(dump.all, row, rows), reader.read(-3 + row, rows, dump.all.channels));
+}
+
+TEST(Dump, SeveralThreadsMayReadAtOnce) {
+    const TemporaryFolder folder;
+    const TestDump dump = makeDump({0, 0, 40, 32}, mixedChannels(), kAdaptive);
+    writeDump(folder / "a.exr", dump);
+    const DumpReader reader(folder / "a.exr");
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 4; ++t)
+        threads.emplace_back([&, t] {
+            for (int row = t; row < 24; row += 3)
+                expectSame(rowsOf(dump.all, row, 8), reader.read(row, 8, dump.all.channels));
+        });
+    for (auto& thread : threads) thread.join();
 }
 
 TEST(Dump, ChannelsAsAskedFor) {
