@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "variolux/geostat/variogram_model.h"
