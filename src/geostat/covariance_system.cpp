@@ -219,12 +219,26 @@ bool CovarianceSystem::careful() const {
            report_.conditionEstimate > kLargestPlainCondition;
 }
 
+namespace {
+
+/// A few right-hand sides are quicker one at a time.
+template <class Triangle, class Matrix>
+void solveTriangle(const Triangle& triangle, Matrix& x) {
+    if (x.cols() >= 4) return triangle.solveInPlace(x);
+    for (Index t = 0; t < x.cols(); ++t) {
+        auto column = x.col(t);
+        triangle.solveInPlace(column);
+    }
+}
+
+}  // namespace
+
 void CovarianceSystem::solveLower(MatrixXd& x) const {
     const Index n = covariance_.rows();
     if (n == 0 || x.cols() == 0) return;
-    if (!report_.singlePrecision) return factor_.topRows(n).triangularView<Eigen::Lower>().solveInPlace(x);
+    if (!report_.singlePrecision) return solveTriangle(factor_.topRows(n).triangularView<Eigen::Lower>(), x);
     Eigen::MatrixXf y = x.cast<float>();
-    factorSingle_.topRows(n).triangularView<Eigen::Lower>().solveInPlace(y);
+    solveTriangle(factorSingle_.topRows(n).triangularView<Eigen::Lower>(), y);
     x = y.cast<double>();
 }
 
@@ -232,9 +246,9 @@ void CovarianceSystem::solveUpper(MatrixXd& x) const {
     const Index n = covariance_.rows();
     if (n == 0 || x.cols() == 0) return;
     if (!report_.singlePrecision)
-        return factor_.topRows(n).triangularView<Eigen::Lower>().transpose().solveInPlace(x);
+        return solveTriangle(factor_.topRows(n).triangularView<Eigen::Lower>().transpose(), x);
     Eigen::MatrixXf y = x.cast<float>();
-    factorSingle_.topRows(n).triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+    solveTriangle(factorSingle_.topRows(n).triangularView<Eigen::Lower>().transpose(), y);
     x = y.cast<double>();
 }
 
@@ -372,12 +386,12 @@ CovarianceSystem::Solution CovarianceSystem::solveOnce(const MatrixXd& c0, const
         return out;
     }
     MatrixXd& t = out.multipliers;
-    r_.triangularView<Eigen::Upper>().transpose().solveInPlace(t);
-    t.noalias() -= q_.transpose() * x;
+    solveTriangle(r_.triangularView<Eigen::Upper>().transpose(), t);
+    t.noalias() -= q_.transpose().lazyProduct(x);
     out.explained = x.colwise().squaredNorm() - t.colwise().squaredNorm();
-    x.noalias() += q_ * t;
+    x.noalias() += q_.lazyProduct(t);
     solveUpper(x);
-    r_.triangularView<Eigen::Upper>().solveInPlace(t);
+    solveTriangle(r_.triangularView<Eigen::Upper>(), t);
     t = -t;
     return out;
 }
@@ -452,8 +466,9 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
             continue;
         }
         out.status[at] = f0.estimable[at] ? TargetStatus::Ok : TargetStatus::NotEstimable;
-        const RowVectorXd residual = v.col(t).transpose() * values_;
-        out.estimate.row(t) = reference_ * f0.constant[t] + residual.cwiseProduct(valueScale_);
+        for (Index c = 0; c < columns; ++c)
+            out.estimate(t, c) =
+                reference_[c] * f0.constant[t] + v.col(t).dot(values_.col(c)) * valueScale_[c];
         out.lowestVariance = std::min(out.lowestVariance, variance[t]);
         out.variance[t] = std::max(0.0, variance[t]);
         if (options.weights) out.weights.row(t) = v.col(t).cwiseProduct(scale_).transpose();

@@ -150,40 +150,44 @@ void KrigingSystem::merge() {
     const Index n = dataPositions_.rows(), d = dimension_, q = dataExternal_.cols();
     row_.assign(static_cast<std::size_t>(n), -1);
     share_ = VectorXd::Zero(n);
-    MatrixXd keys(d + q, n);  // one datum a column: contiguous for the comparisons
-    keys.topRows(d) = dataPositions_.transpose();
-    keys.bottomRows(q) = dataExternal_.transpose();
-    std::vector<Index> order;
-    for (Index i = 0; i < n; ++i)
-        if (std::isfinite(dataErrors_[i] * varianceScale_)) order.push_back(i);
-    report_.ignored = n - static_cast<Index>(order.size());
-    const auto compare = [&](Index a, Index b) {
-        for (Index j = 0; j < d + q; ++j)
-            if (keys(j, a) != keys(j, b)) return keys(j, a) < keys(j, b) ? -1 : 1;
-        return 0;
-    };
-    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-        const int c = compare(a, b);
-        return c != 0 ? c < 0 : a < b;
-    });
-    // Groups of coincident data, in the order of their first members.
-    std::vector<std::vector<Index>> groups;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        if (i > 0 && compare(order[i - 1], order[i]) == 0)
-            groups.back().push_back(order[i]);
-        else
-            groups.push_back({order[i]});
+    // Coincident data have equal sums of coordinates; whether equal sums are coincident is then looked at.
+    std::vector<std::pair<double, Index>> sums;
+    sums.reserve(static_cast<std::size_t>(n));
+    for (Index i = 0; i < n; ++i) {
+        if (!std::isfinite(dataErrors_[i] * varianceScale_)) continue;
+        double sum = 0, factor = 1;
+        for (Index j = 0; j < d; ++j, factor *= 0.6180339887498949)
+            sum += factor * (dataPositions_(i, j) * coordinateScale_);
+        sums.emplace_back(sum, i);
     }
-    // Groups at one place that differ in their external drift.
-    std::vector<std::pair<Index, Index>> twins;
-    for (std::size_t a = 0; q > 0 && a < groups.size(); ++a)
-        for (std::size_t b = a + 1; b < groups.size(); ++b) {
-            if (keys.col(groups[a][0]).head(d) != keys.col(groups[b][0]).head(d)) break;
-            twins.emplace_back(groups[a][0], groups[b][0]);
+    report_.ignored = n - static_cast<Index>(sums.size());
+    std::sort(sums.begin(), sums.end());
+    const auto samePlace = [&](Index a, Index b) { return dataPositions_.row(a) == dataPositions_.row(b); };
+    const auto sameDrift = [&](Index a, Index b) {
+        return q == 0 || dataExternal_.row(a) == dataExternal_.row(b);
+    };
+    std::vector<std::vector<Index>> groups;      // of coincident data, each in the order given
+    std::vector<std::pair<Index, Index>> twins;  // at one place, with different drift
+    groups.reserve(sums.size());
+    for (std::size_t first = 0, last = 0; first < sums.size(); first = last) {
+        const std::size_t run = groups.size();
+        for (last = first; last < sums.size() && sums[last].first == sums[first].first; ++last) {
+            const Index i = sums[last].second;
+            std::size_t g = run;
+            for (; g < groups.size(); ++g) {
+                if (!samePlace(groups[g][0], i)) continue;
+                if (sameDrift(groups[g][0], i)) break;
+                twins.emplace_back(groups[g][0], i);
+            }
+            if (g == groups.size())
+                groups.push_back({i});
+            else
+                groups[g].push_back(i);
         }
+    }
     std::sort(groups.begin(), groups.end());
     const auto rows = static_cast<Index>(groups.size());
-    report_.merged = static_cast<Index>(order.size()) - rows;
+    report_.merged = static_cast<Index>(sums.size()) - rows;
 
     positions_.resize(d, rows);
     external_.resize(rows, q);
@@ -191,7 +195,7 @@ void KrigingSystem::merge() {
     values_.resize(rows, dataValues_.cols());
     for (Index r = 0; r < rows; ++r) {
         const std::vector<Index>& group = groups[static_cast<std::size_t>(r)];
-        positions_.col(r) = keys.col(group[0]).head(d);
+        positions_.col(r) = dataPositions_.row(group[0]).transpose();
         external_.row(r) = dataExternal_.row(group[0]);
         double lowest = kInfinity;
         for (const Index i : group) lowest = std::min(lowest, dataErrors_[i]);
