@@ -321,6 +321,7 @@ void CovarianceSystem::centreValues() {
 }
 
 void CovarianceSystem::describe() {
+    if (!report_.degenerate && report_.jitter == 0 && report_.droppedDrift == 0) return;
     std::ostringstream text;
     const auto separate = [&]() -> std::ostream& { return text << (text.tellp() > 0 ? "; " : ""); };
     if (report_.degenerate) separate() << "some data have no variance at all";

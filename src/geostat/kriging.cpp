@@ -83,7 +83,9 @@ bool KrigingSystem::validate(const KrigingProblem& problem) {
     if (problem.drift.mean.size() != 0 &&
         (problem.drift.mean.size() != problem.values.cols() || !problem.drift.mean.allFinite()))
         return fail("the known mean must be finite, one number a value column");
-    for (Index i = 0; i < n; ++i) {
+    const bool good = problem.positions.allFinite() && problem.values.allFinite() &&
+                      problem.drift.external.allFinite() && (problem.errorVariances.array() >= 0).all();
+    for (Index i = 0; !good && i < n; ++i) {  // which one
         for (Index j = 0; j < d; ++j)
             if (!std::isfinite(problem.positions(i, j)))
                 return fail(invalidDatum(i, "coordinate", problem.positions(i, j), "finite"));
@@ -146,22 +148,47 @@ void KrigingSystem::chooseScales(const KrigingProblem& problem) {
     }
 }
 
-void KrigingSystem::merge() {
-    const Index n = dataPositions_.rows(), d = dimension_, q = dataExternal_.cols();
-    row_.assign(static_cast<std::size_t>(n), -1);
-    share_ = VectorXd::Zero(n);
-    // Coincident data have equal sums of coordinates; whether equal sums are coincident is then looked at.
+/// Data sorted by a sum of their coordinates: coincident data have equal sums, and whether equal sums are
+/// coincident is then looked at. Ignored data are left out.
+std::vector<std::pair<double, Index>> KrigingSystem::sortedSums() const {
     std::vector<std::pair<double, Index>> sums;
-    sums.reserve(static_cast<std::size_t>(n));
-    for (Index i = 0; i < n; ++i) {
+    sums.reserve(row_.size());
+    for (Index i = 0; i < dataPositions_.rows(); ++i) {
         if (!std::isfinite(dataErrors_[i] * varianceScale_)) continue;
         double sum = 0, factor = 1;
-        for (Index j = 0; j < d; ++j, factor *= 0.6180339887498949)
+        for (Index j = 0; j < dimension_; ++j, factor *= 0.6180339887498949)
             sum += factor * (dataPositions_(i, j) * coordinateScale_);
         sums.emplace_back(sum, i);
     }
-    report_.ignored = n - static_cast<Index>(sums.size());
     std::sort(sums.begin(), sums.end());
+    return sums;
+}
+
+void KrigingSystem::merge() {
+    const Index n = dataPositions_.rows();
+    row_.assign(static_cast<std::size_t>(n), -1);
+    share_ = VectorXd::Zero(n);
+    const auto sums = sortedSums();
+    report_.ignored = n - static_cast<Index>(sums.size());
+    const auto equal = [](const auto& a, const auto& b) { return a.first == b.first; };
+    if (report_.ignored == 0 && std::adjacent_find(sums.begin(), sums.end(), equal) == sums.end()) {
+        std::iota(row_.begin(), row_.end(), Index{0});
+        share_.setOnes();
+        positions_ = dataPositions_.transpose();
+        external_ = dataExternal_;
+        errors_ = dataErrors_ * varianceScale_;
+        values_ = dataValues_;
+    } else {
+        mergeGroups(sums);
+    }
+    // Padded with zeros to whole vectors.
+    const Index rows = errors_.size();
+    places_ = MatrixXd::Zero((rows + 7) / 8 * 8, transform_.size() > 0 ? transform_.rows() : dimension_);
+    places_.topRows(rows) = place(positions_.transpose());
+}
+
+void KrigingSystem::mergeGroups(const std::vector<std::pair<double, Index>>& sums) {
+    const Index d = dimension_, q = dataExternal_.cols();
     const auto samePlace = [&](Index a, Index b) { return dataPositions_.row(a) == dataPositions_.row(b); };
     const auto sameDrift = [&](Index a, Index b) {
         return q == 0 || dataExternal_.row(a) == dataExternal_.row(b);
@@ -209,21 +236,16 @@ void KrigingSystem::merge() {
         // Differences from one member: equal values merge exactly.
         const RowVectorXd first = dataValues_.row(group[0]);
         RowVectorXd mean = RowVectorXd::Zero(first.size());
-        if (group.size() == 1) {
-            share_[group[0]] = 1;
-        } else {
+        if (group.size() > 1)
             for (const Index i : group) {
                 share_[i] /= sum;
                 mean += share_[i] * (dataValues_.row(i) - first);
             }
-        }
         values_.row(r) = first + mean;
     }
     for (const auto& [a, b] : twins)
-        twins_.emplace_back(row_[static_cast<std::size_t>(a)], row_[static_cast<std::size_t>(b)]);
-    // Padded with zeros to whole vectors.
-    places_ = MatrixXd::Zero((rows + 7) / 8 * 8, transform_.size() > 0 ? transform_.rows() : d);
-    places_.topRows(rows) = place(positions_.transpose());
+        if (row_[static_cast<std::size_t>(a)] != row_[static_cast<std::size_t>(b)])
+            twins_.emplace_back(row_[static_cast<std::size_t>(a)], row_[static_cast<std::size_t>(b)]);
 }
 
 /// Scaled and transformed coordinates, one point a row. Untransformed coordinates are scaled but not
@@ -308,14 +330,15 @@ void KrigingSystem::completeReport() {
     system.merged = report_.merged;
     system.ignored = report_.ignored;
     system.generalisedCovariance = report_.generalisedCovariance;
+    report_ = system;
+    if (system.ignored == 0 && system.merged == 0 && !system.generalisedCovariance) return;
     std::ostringstream text;
     const auto separate = [&]() -> std::ostream& { return text << (text.tellp() > 0 ? "; " : ""); };
     if (system.ignored > 0) separate() << system.ignored << " data of infinite error variance ignored";
     if (system.merged > 0) separate() << system.merged << " coincident data merged";
     if (system.generalisedCovariance) separate() << "generalised covariance";
     if (!system.message.empty()) separate() << system.message;
-    system.message = text.str();
-    report_ = system;
+    report_.message = text.str();
 }
 
 KrigingSystem::Block KrigingSystem::block(const KrigingTargets& targets, Index target) const {
