@@ -19,17 +19,6 @@ using Eigen::VectorXd;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// 2^-floor(log2(x)): brings x > 0 into [1, 2) without rounding anything.
-double unitScale(double x) {
-    return x > 0 && std::isfinite(x) ? std::ldexp(1.0, std::clamp(-std::ilogb(x), -1000, 1000)) : 1;
-}
-
-std::string invalidDatum(Index datum, const char* field, double found, const char* expected) {
-    std::ostringstream text;
-    text << "datum " << datum << ": " << field << " must be " << expected << ", found " << found;
-    return text.str();
-}
-
 }  // namespace
 
 /// One target: a point, or the points of a block with weights that sum to 1.
@@ -62,164 +51,6 @@ KrigingSystem::KrigingSystem(const KrigingProblem& problem) {
     merge();
     assemble(problem.precision);
     completeReport();
-}
-
-bool KrigingSystem::validate(const KrigingProblem& problem) {
-    const Index n = problem.positions.rows(), d = problem.positions.cols();
-    const auto fail = [&](std::string message) {
-        report_.message = std::move(message);
-        return false;
-    };
-    if (const auto broken = problem.model.validate()) return fail("model: " + *broken);
-    const bool shapes = (d > 0 || n == 0) && problem.values.rows() == n &&
-                        (problem.errorVariances.size() == 0 || problem.errorVariances.size() == n) &&
-                        (problem.drift.external.size() == 0 || problem.drift.external.rows() == n);
-    if (!shapes)
-        return fail("positions, values, error variances and external drift must have one row a datum");
-    if (problem.transform.size() > 0 && (problem.transform.cols() != d || !problem.transform.allFinite()))
-        return fail("the transform must be finite, with one column a coordinate");
-    if (problem.drift.axes < 0 || problem.drift.axes > d)
-        return fail("the drift's axes must be between 0 and the number of coordinates");
-    if (problem.drift.mean.size() != 0 &&
-        (problem.drift.mean.size() != problem.values.cols() || !problem.drift.mean.allFinite()))
-        return fail("the known mean must be finite, one number a value column");
-    for (Index i = 0; i < n; ++i) {
-        for (Index j = 0; j < d; ++j)
-            if (!std::isfinite(problem.positions(i, j)))
-                return fail(invalidDatum(i, "coordinate", problem.positions(i, j), "finite"));
-        for (Index j = 0; j < problem.values.cols(); ++j)
-            if (!std::isfinite(problem.values(i, j)))
-                return fail(invalidDatum(i, "value", problem.values(i, j), "finite"));
-        for (Index j = 0; j < problem.drift.external.cols(); ++j)
-            if (!std::isfinite(problem.drift.external(i, j)))
-                return fail(invalidDatum(i, "external drift", problem.drift.external(i, j), "finite"));
-        if (problem.errorVariances.size() > 0 && !(problem.errorVariances[i] >= 0))
-            return fail(invalidDatum(i, "error variance", problem.errorVariances[i], ">= 0"));
-    }
-    drift_ = problem.drift;
-    dataExternal_ = problem.drift.external.size() > 0 ? problem.drift.external : MatrixXd(n, 0);
-    drift_.external.resize(0, dataExternal_.cols());
-    if (drift_.axes == 0) drift_.axes = d;
-    dataPositions_ = problem.positions;
-    dataValues_ = problem.values;
-    dataErrors_ = problem.errorVariances.size() > 0 ? problem.errorVariances : VectorXd(VectorXd::Zero(n));
-    dimension_ = d;
-    if (!problem.model.bounded() && constantColumn() < 0)
-        return fail("an unbounded variogram needs a constant among the drift functions");
-    return true;
-}
-
-/// The drift column that is constant over the data, or -1: what the generalised covariance needs.
-Index KrigingSystem::constantColumn() const {
-    if (drift_.polynomial != DriftPolynomial::None) return 0;
-    for (Index j = 0; j < dataExternal_.cols() && dataExternal_.rows() > 0; ++j)
-        if (dataExternal_(0, j) != 0 && (dataExternal_.col(j).array() == dataExternal_(0, j)).all()) return j;
-    return -1;
-}
-
-void KrigingSystem::chooseScales(const KrigingProblem& problem) {
-    const Index n = dataPositions_.rows();
-    transform_ = problem.transform;
-    origin_ = VectorXd::Zero(dimension_);
-    double extent = 0;
-    for (Index j = 0; n > 0 && j < dimension_; ++j) {
-        const double low = dataPositions_.col(j).minCoeff(), high = dataPositions_.col(j).maxCoeff();
-        origin_[j] = low == high ? low : low / 2 + high / 2;
-        extent = std::max(extent, high / 2 - low / 2);
-    }
-    coordinateScale_ = unitScale(extent);
-
-    model_ = problem.model;
-    double sill = model_.nugget;
-    for (const VariogramStructure& s : model_.structures) sill += s.sill;
-    if (sill == 0)
-        for (Index i = 0; i < n; ++i)
-            if (std::isfinite(dataErrors_[i])) sill = std::max(sill, dataErrors_[i]);
-    varianceScale_ = unitScale(sill);
-    nugget_ = model_.nugget * varianceScale_;
-    model_.nugget = 0;
-    std::erase_if(model_.structures, [](const VariogramStructure& s) { return s.sill == 0; });
-    for (VariogramStructure& s : model_.structures) {
-        s.sill *= varianceScale_;
-        s.range = std::clamp(s.range * coordinateScale_, 1e-300, 1e300);
-        structureSill_ += s.sill;
-    }
-}
-
-void KrigingSystem::merge() {
-    const Index n = dataPositions_.rows(), d = dimension_, q = dataExternal_.cols();
-    row_.assign(static_cast<std::size_t>(n), -1);
-    share_ = VectorXd::Zero(n);
-    MatrixXd keys(d + q, n);  // one datum a column: contiguous for the comparisons
-    keys.topRows(d) = dataPositions_.transpose();
-    keys.bottomRows(q) = dataExternal_.transpose();
-    std::vector<Index> order;
-    for (Index i = 0; i < n; ++i)
-        if (std::isfinite(dataErrors_[i] * varianceScale_)) order.push_back(i);
-    report_.ignored = n - static_cast<Index>(order.size());
-    const auto compare = [&](Index a, Index b) {
-        for (Index j = 0; j < d + q; ++j)
-            if (keys(j, a) != keys(j, b)) return keys(j, a) < keys(j, b) ? -1 : 1;
-        return 0;
-    };
-    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-        const int c = compare(a, b);
-        return c != 0 ? c < 0 : a < b;
-    });
-    // Groups of coincident data, in the order of their first members.
-    std::vector<std::vector<Index>> groups;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        if (i > 0 && compare(order[i - 1], order[i]) == 0)
-            groups.back().push_back(order[i]);
-        else
-            groups.push_back({order[i]});
-    }
-    // Groups at one place that differ in their external drift.
-    std::vector<std::pair<Index, Index>> twins;
-    for (std::size_t a = 0; q > 0 && a < groups.size(); ++a)
-        for (std::size_t b = a + 1; b < groups.size(); ++b) {
-            if (keys.col(groups[a][0]).head(d) != keys.col(groups[b][0]).head(d)) break;
-            twins.emplace_back(groups[a][0], groups[b][0]);
-        }
-    std::sort(groups.begin(), groups.end());
-    const auto rows = static_cast<Index>(groups.size());
-    report_.merged = static_cast<Index>(order.size()) - rows;
-
-    positions_.resize(d, rows);
-    external_.resize(rows, q);
-    errors_.resize(rows);
-    values_.resize(rows, dataValues_.cols());
-    for (Index r = 0; r < rows; ++r) {
-        const std::vector<Index>& group = groups[static_cast<std::size_t>(r)];
-        positions_.col(r) = keys.col(group[0]).head(d);
-        external_.row(r) = dataExternal_.row(group[0]);
-        double lowest = kInfinity;
-        for (const Index i : group) lowest = std::min(lowest, dataErrors_[i]);
-        double sum = 0;
-        for (const Index i : group) {
-            row_[static_cast<std::size_t>(i)] = r;
-            share_[i] = lowest > 0 ? lowest / dataErrors_[i] : (dataErrors_[i] == 0 ? 1 : 0);
-            sum += share_[i];
-        }
-        errors_[r] = lowest * varianceScale_ / sum;
-        // Differences from one member: equal values merge exactly.
-        const RowVectorXd first = dataValues_.row(group[0]);
-        RowVectorXd mean = RowVectorXd::Zero(first.size());
-        if (group.size() == 1) {
-            share_[group[0]] = 1;
-        } else {
-            for (const Index i : group) {
-                share_[i] /= sum;
-                mean += share_[i] * (dataValues_.row(i) - first);
-            }
-        }
-        values_.row(r) = first + mean;
-    }
-    for (const auto& [a, b] : twins)
-        twins_.emplace_back(row_[static_cast<std::size_t>(a)], row_[static_cast<std::size_t>(b)]);
-    // Padded with zeros to whole vectors.
-    places_ = MatrixXd::Zero((rows + 7) / 8 * 8, transform_.size() > 0 ? transform_.rows() : d);
-    places_.topRows(rows) = place(positions_.transpose());
 }
 
 /// Scaled and transformed coordinates, one point a row. Untransformed coordinates are scaled but not
@@ -304,14 +135,15 @@ void KrigingSystem::completeReport() {
     system.merged = report_.merged;
     system.ignored = report_.ignored;
     system.generalisedCovariance = report_.generalisedCovariance;
+    report_ = system;
+    if (system.ignored == 0 && system.merged == 0 && !system.generalisedCovariance) return;
     std::ostringstream text;
     const auto separate = [&]() -> std::ostream& { return text << (text.tellp() > 0 ? "; " : ""); };
     if (system.ignored > 0) separate() << system.ignored << " data of infinite error variance ignored";
     if (system.merged > 0) separate() << system.merged << " coincident data merged";
     if (system.generalisedCovariance) separate() << "generalised covariance";
     if (!system.message.empty()) separate() << system.message;
-    system.message = text.str();
-    report_ = system;
+    report_.message = text.str();
 }
 
 KrigingSystem::Block KrigingSystem::block(const KrigingTargets& targets, Index target) const {
@@ -425,112 +257,6 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
                 const auto datum = static_cast<Index>(i);
                 out.weights.col(datum) = merged.col(row_[i]) * share_[datum];
             }
-    }
-    return out;
-}
-
-DriftEstimate KrigingSystem::drift() const {
-    if (!report_.ok()) return {};
-    DriftEstimate out = report_.generalisedCovariance ? generalisedDrift() : system_.drift();
-    const Index p = out.coefficients.rows();
-    // The polynomial columns are in scaled coordinates.
-    VectorXd unit = VectorXd::Ones(p);
-    if (drift_.polynomial >= DriftPolynomial::Linear)
-        unit.segment(1, drift_.axes).setConstant(coordinateScale_);
-    if (drift_.polynomial == DriftPolynomial::Quadratic)
-        unit.segment(1 + drift_.axes, drift_.axes * (drift_.axes + 1) / 2)
-            .setConstant(coordinateScale_ * coordinateScale_);
-    out.coefficients = unit.asDiagonal() * out.coefficients;
-    out.covariance = unit.asDiagonal() * out.covariance * unit.asDiagonal() / varianceScale_;
-    return out;
-}
-
-/// Each coefficient as a target of its own; their covariance w'K w in the field's own covariance,
-/// K = sill - gamma + errors.
-DriftEstimate KrigingSystem::generalisedDrift() const {
-    const Index n = errors_.size(), constant = constantColumn();
-    CovarianceTargets targets;
-    const Index p = driftRows(MatrixXd(0, dimension_), MatrixXd(0, external_.cols())).cols();
-    targets.drift = MatrixXd::Identity(p, p);
-    targets.variance = VectorXd::Zero(p);
-    targets.covariance = MatrixXd::Zero(n, p);
-    VectorXd sum = VectorXd::Zero(p);
-    sum[constant] = drift_.polynomial == DriftPolynomial::None ? 1 / external_(0, constant) : 1;
-    targets.covariance.col(constant) = level_ + sum[constant] * centreGamma_.array();
-    const KrigingPrediction prediction = system_.predict(targets, {.weights = true});
-    DriftEstimate out{prediction.estimate, {}};
-    MatrixXd gamma(n, n);
-    for (Index j = 0; j < n; ++j)
-        for (Index i = 0; i < n; ++i) {
-            gamma(i, j) = semivariance(model_, (places_.row(i) - places_.row(j)).norm());
-            if (i == j) gamma(i, j) -= errors_[i];
-            if (positions_.col(i) == positions_.col(j)) gamma(i, j) -= nugget_;
-        }
-    out.covariance = -prediction.weights * gamma * prediction.weights.transpose();
-    const double sill = model_.bounded() ? structureSill_ : kInfinity;
-    out.covariance(constant, constant) += sill * sum[constant] * sum[constant];
-    if (!model_.bounded()) out.coefficients.row(constant).setConstant(kNaN);
-    return out;
-}
-
-LeaveOneOut KrigingSystem::leaveOneOut() const {
-    const auto n = static_cast<Index>(row_.size());
-    const LeaveOneOut merged = system_.leaveOneOut();
-    LeaveOneOut out;
-    out.estimate = MatrixXd::Constant(n, dataValues_.cols(), kNaN);
-    out.variance = VectorXd::Constant(n, kNaN);
-    out.status.assign(static_cast<std::size_t>(n), TargetStatus::NotEstimable);
-    if (!report_.ok()) return out;
-    const RowVectorXd mean = driftRows(MatrixXd(0, dimension_), MatrixXd(0, external_.cols())).cols() == 0 &&
-                                     drift_.mean.size() > 0
-                                 ? drift_.mean
-                                 : RowVectorXd(RowVectorXd::Zero(dataValues_.cols()));
-    for (Index i = 0; i < n; ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        const Index r = row_[at];
-        if (r < 0) {  // ignored: every other datum predicts it
-            KrigingTargets target;
-            target.points = dataPositions_.row(i);
-            target.externalDrift = dataExternal_.row(i);
-            const KrigingPrediction prediction = predict(target);
-            out.estimate.row(i) = prediction.estimate.row(0);
-            out.status[at] = prediction.status[0];
-            out.variance[i] = kInfinity;
-            continue;
-        }
-        // What the coincident others say of the field here: mean and variance.
-        double precision = 0, exact = 0;
-        RowVectorXd weighted = RowVectorXd::Zero(mean.size()), average = weighted;
-        for (std::size_t j = 0; j < row_.size(); ++j) {
-            if (row_[j] != r || j == at) continue;
-            const auto other = static_cast<Index>(j);
-            const double v = dataErrors_[other] * varianceScale_;
-            if (v == 0) {
-                exact += 1;
-                average += dataValues_.row(other);
-            } else {
-                precision += 1 / v;
-                weighted += dataValues_.row(other) / v;
-            }
-        }
-        const double error = dataErrors_[i] * varianceScale_;
-        const bool estimable = merged.status[static_cast<std::size_t>(r)] == TargetStatus::Ok;
-        double variance = 0;  // of the field here, from all others
-        if (exact > 0) {
-            out.estimate.row(i) = average / exact;
-        } else if (!estimable) {
-            if (precision == 0) continue;
-            out.estimate.row(i) = weighted / precision;
-            variance = 1 / precision;
-        } else {
-            const double prior = std::max(0.0, merged.variance[r] - errors_[r]);
-            const RowVectorXd prediction = merged.estimate.row(r) + mean;
-            const double gain = prior / (1 + prior * precision);
-            out.estimate.row(i) = prediction + gain * (weighted - precision * prediction);
-            variance = precision == 0 ? merged.variance[r] - error : gain;
-        }
-        out.status[at] = TargetStatus::Ok;
-        out.variance[i] = (variance + error) / varianceScale_;
     }
     return out;
 }

@@ -63,21 +63,15 @@ template <class V>
     const V shifted = y * 1.4426950408889634074 + shift;
     const V k = shifted - shift;
     const V r = (y - k * 0x1.62e42fee00000p-1) - k * 0x1.a39ef35793c76p-33;
-    V p = spread<V>(1.0 / 6227020800.0);
-    p = p * r + 1.0 / 479001600.0;
-    p = p * r + 1.0 / 39916800.0;
-    p = p * r + 1.0 / 3628800.0;
-    p = p * r + 1.0 / 362880.0;
-    p = p * r + 1.0 / 40320.0;
-    p = p * r + 1.0 / 5040.0;
-    p = p * r + 1.0 / 720.0;
-    p = p * r + 1.0 / 120.0;
-    p = p * r + 1.0 / 24.0;
-    p = p * r + 1.0 / 6.0;
-    p = p * r + 0.5;
+    // Estrin's order: short chains of dependent operations.
+    const V r2 = r * r, r4 = r2 * r2;
+    const V low = (0.5 + r * (1.0 / 6)) + r2 * (1.0 / 24 + r * (1.0 / 120));
+    const V middle = (1.0 / 720 + r * (1.0 / 5040)) + r2 * (1.0 / 40320 + r * (1.0 / 362880));
+    const V high = (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800));
+    const V p = low + r4 * (middle + r4 * high);
     // The low bits of `shifted` are the integer k.
     const IntegersLike<V> bits = (reinterpret_cast<IntegersLike<V>>(shifted) << 52) + 0x3ff0000000000000;
-    return {reinterpret_cast<V>(bits), r + r * r * p};
+    return {reinterpret_cast<V>(bits), r + r2 * p};
 }
 
 /// exp(-x) for x >= 0.
@@ -105,17 +99,11 @@ template <class V>
     const V k = reinterpret_cast<V>(exponent + reinterpret_cast<IntegersLike<V>>(shift)) - shift;
     const V s = (m - 1.0) / (m + 1.0);
     const V s2 = s * s;
-    V p = spread<V>(2.0 / 23);
-    p = p * s2 + 2.0 / 21;
-    p = p * s2 + 2.0 / 19;
-    p = p * s2 + 2.0 / 17;
-    p = p * s2 + 2.0 / 15;
-    p = p * s2 + 2.0 / 13;
-    p = p * s2 + 2.0 / 11;
-    p = p * s2 + 2.0 / 9;
-    p = p * s2 + 2.0 / 7;
-    p = p * s2 + 2.0 / 5;
-    p = p * s2 + 2.0 / 3;
+    const V s4 = s2 * s2, s8 = s4 * s4;
+    const V low = (2.0 / 3 + s2 * (2.0 / 5)) + s4 * (2.0 / 7 + s2 * (2.0 / 9));
+    const V middle = (2.0 / 11 + s2 * (2.0 / 13)) + s4 * (2.0 / 15 + s2 * (2.0 / 17));
+    const V high = (2.0 / 19 + s2 * (2.0 / 21)) + s4 * (2.0 / 23);
+    const V p = low + s8 * (middle + s8 * high);
     return k * 0x1.62e42fefa39efp-1 + (2.0 * s + s * s2 * p);
 }
 

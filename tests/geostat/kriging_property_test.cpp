@@ -303,6 +303,32 @@ TEST(KrigingProperty, BlocksAreAveragesOfPoints) {
         for (Index t = 0; t <= m; ++t) points.begin.push_back(t);
         const KrigingPrediction b = system.predict(blocks), p = system.predict(points);
         const double sum = blocks.weights.sum();
+        if (r.problem.drift.polynomial != DriftPolynomial::None) {
+            // With weights that sum to 1 the variance is that of an increment:
+            // 2 sum w gamma(x_i, B) - w'Gamma w - gamma(B, B) + errors, whatever form the solver used.
+            KrigingPredictOptions weights;
+            weights.weights = true;
+            const VectorXd w = system.predict(blocks, weights).weights.row(0).transpose();
+            VariogramModel structures = r.problem.model;
+            structures.nugget = 0;
+            const MatrixXd& x = r.problem.positions;
+            const MatrixXd& y = r.targets.points;
+            const VectorXd share = blocks.weights / sum;
+            const auto mean = [&](const MatrixXd& from, const VectorXd& wFrom, const MatrixXd& to,
+                                  const VectorXd& wTo) {
+                double total = 0;
+                for (Index i = 0; i < from.rows(); ++i)
+                    for (Index j = 0; j < to.rows(); ++j)
+                        total +=
+                            wFrom[i] * wTo[j] * semivariance(structures, (from.row(i) - to.row(j)).norm());
+                return total;
+            };
+            double variance = 2 * mean(x, w, y, share) - mean(x, w, x, w) - mean(y, share, y, share) +
+                              r.problem.model.nugget * w.squaredNorm();
+            if (r.problem.errorVariances.size() > 0) variance += w.cwiseAbs2().dot(r.problem.errorVariances);
+            const double size = std::max(1.0, w.cwiseAbs().sum());
+            EXPECT_NEAR(b.variance[0], variance, 1e-9 * size * size * varianceSize(r.problem));
+        }
         EXPECT_NEAR(b.estimate(0, 0), blocks.weights.dot(p.estimate.col(0)) / sum, 1e-8 * 10);
         // The standard deviation of a mean is at most the mean standard deviation.
         EXPECT_LE(std::sqrt(b.variance[0]), blocks.weights.dot(p.variance.cwiseSqrt()) / sum +

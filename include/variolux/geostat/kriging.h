@@ -134,7 +134,9 @@ class KrigingSystem {
     struct Block;
     bool validate(const KrigingProblem& problem);
     void chooseScales(const KrigingProblem& problem);
+    std::vector<std::pair<double, Eigen::Index>> sortedSums() const;
     void merge();
+    void mergeGroups(const std::vector<std::pair<double, Eigen::Index>>& sums);
     void assemble(KrigingPrecision precision);
     void completeReport();
     Eigen::MatrixXd place(const Eigen::MatrixXd& points) const;
