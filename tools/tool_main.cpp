@@ -3,8 +3,10 @@
 #include <csignal>
 #include <cstdio>
 #include <iostream>
+#include <memory>
 #include <new>
 
+#include "help_formatter.h"
 #include "variolux/base/error.h"
 
 namespace vlx {
@@ -22,13 +24,19 @@ int badUsage(const CLI::App& app, const std::string& message) {
     return kBadUsage;
 }
 
+void setFormatter(CLI::App& app, const std::shared_ptr<CLI::FormatterBase>& formatter) {
+    app.formatter(formatter);
+    for (CLI::App* const command : app.get_subcommands([](CLI::App*) { return true; }))
+        setFormatter(*command, formatter);
+}
+
 }  // namespace
 
 int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run) {
     // A file size limit must end in an error message and a clean folder, like a full disk, not in a signal.
     std::signal(SIGXFSZ, SIG_IGN);
     app.set_version_flag("--version", "Variolux " VARIOLUX_VERSION, "Print the version and exit");
-    app.get_formatter()->column_width(34);
+    setFormatter(app, std::make_shared<HelpFormatter>());
     try {
         app.parse(argc, argv);
         const int code = run();

@@ -408,6 +408,9 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
         if (find(parts[part], required) == nullptr)
             throw Error(path, std::string("damaged header: attribute '") + required + "' is missing");
 
+    if (const int layout = rawInt(start, find(parts[part], "version")).value_or(1); layout != 1)
+        throw Error(path, "expected deep data of version 1, found version " + std::to_string(layout));
+
     const Imf::Header parsed = parse(path, start, parts[part], version);
     header.dump = toDumpHeader(path, parsed);
     if (find(parts[part], "displayWindow") == nullptr) header.dump.display = header.dump.data;

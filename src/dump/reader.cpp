@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <exception>
+#include <functional>
 #include <limits>
 
 #include "exr_header.h"
@@ -59,6 +61,21 @@ void widen(const unsigned char* bytes, ChannelType type, std::uint64_t count, fl
     } else {
         for (std::uint64_t i = 0; i < count; ++i) to[i] = static_cast<float>(loadWord(bytes + 4 * i));
     }
+}
+
+// parallelFor over rows that throws the first row's error, not the one that happened to come first.
+void forRows(int rows, const std::function<void(std::size_t)>& body) {
+    std::vector<std::exception_ptr> failures(static_cast<std::size_t>(rows));
+    parallelFor(0, rows, [&](std::int64_t i) {
+        const auto row = static_cast<std::size_t>(i);
+        try {
+            body(row);
+        } catch (...) {
+            failures[row] = std::current_exception();
+        }
+    });
+    for (const auto& failure : failures)
+        if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace
@@ -161,9 +178,8 @@ struct DumpReader::Impl {
         Bytes table(8 * static_cast<std::size_t>(rows));
         file.readAt(header.chunkTable + 8 * first, table);
         std::vector<Chunk> chunks(static_cast<std::size_t>(rows));
-        parallelFor(0, rows, [&](std::int64_t row) {
-            chunks[static_cast<std::size_t>(row)] =
-                readCounts(y + static_cast<int>(row), loadLong(table.data() + 8 * row));
+        forRows(rows, [&](std::size_t row) {
+            chunks[row] = readCounts(y + static_cast<int>(row), loadLong(table.data() + 8 * row));
         });
         // Chunks that overlap could claim more memory together than the file is worth.
         std::uint64_t packed = 0;
@@ -220,24 +236,24 @@ SampleBand DumpReader::read(int y, int rows, const std::vector<std::string>& cha
     }
     band.values.resize(band.channels.size());
     for (auto& values : band.values) values.resize(total);
-    parallelFor(0, rows, [&](std::int64_t row) {
-        const Chunk& chunk = chunks[static_cast<std::size_t>(row)];
+    forRows(rows, [&](std::size_t row) {
+        const Chunk& chunk = chunks[row];
         const auto scratch = impl_->pool.borrow();
         const auto raw = scratch->unpacker.unpack(
             impl_->read(chunk.counts + chunk.countsBytes, chunk.packedBytes, *scratch), chunk.rawBytes);
         if (!raw) impl_->damaged(chunk.y, "damaged: its samples do not unpack");
         for (std::size_t c = 0; c < sources.size(); ++c)
             widen(raw->data() + sources[c].bytesBefore * chunk.samples(), sources[c].type, chunk.samples(),
-                  band.values[c].data() + starts[static_cast<std::size_t>(row)]);
+                  band.values[c].data() + starts[row]);
     });
     return band;
 }
 
 std::vector<std::uint32_t> DumpReader::counts(int y, int rows) const {
+    const std::vector<Chunk> chunks = impl_->readCounts(y, rows);
     std::vector<std::uint32_t> counts;
-    counts.reserve(static_cast<std::size_t>(impl_->header.dump.data.width) *
-                   static_cast<std::size_t>(rows > 0 ? rows : 0));
-    for (const Chunk& chunk : impl_->readCounts(y, rows)) {
+    counts.reserve(static_cast<std::size_t>(impl_->header.dump.data.width) * chunks.size());
+    for (const Chunk& chunk : chunks) {
         std::uint32_t last = 0;
         for (const std::uint32_t end : chunk.ends) {
             counts.push_back(end - last);

@@ -11,13 +11,13 @@
 namespace vlx {
 
 /// Reads a dump in bands of rows, in any order, from the first deep scanline part of an OpenEXR file, whoever
-/// wrote it. Nothing in a header is trusted: windows, chunk tables and sample counts are checked against the
-/// file's size before anything is allocated. Memory is one band, whatever the image's height. Not for use
-/// from two threads at once: give each its own reader.
+/// wrote it. Nothing in a header is trusted: windows, chunk tables, sizes and sample counts are checked
+/// against the file's size and each other before memory is asked for. Memory is one band, whatever the
+/// image's height. Reading is const and may be done from several threads at once.
 class DumpReader {
   public:
     /// Opens the file and reads its header. Throws Error (naming the file, and what is wrong) when it is
-    /// missing, not OpenEXR, flat, deep tiled, truncated, has no R, G or B, or has a header that its size
+    /// missing, not OpenEXR, flat, deep tiled, truncated, lacks R, G or B, or has a header that its size
     /// contradicts.
     explicit DumpReader(const std::string& path);
     ~DumpReader();

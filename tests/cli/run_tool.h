@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vlx {
+
+/// What a tool did.
+struct ToolRun {
+    int exitCode;  ///< -signal when a signal ended it
+    std::string out;
+    std::string err;
+};
+
+struct RunOptions {
+    std::optional<std::uint64_t> fileSizeLimit;  ///< bytes a file may grow to: stands for a full disk
+};
+
+/// Runs a program of this build, for example runTool("vlx-compare", {"--version"}), without a shell and
+/// without standard input, and waits for its end.
+ToolRun runTool(const std::string& tool, const std::vector<std::string>& arguments,
+                const RunOptions& options = {});
+
+}  // namespace vlx
