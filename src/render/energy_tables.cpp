@@ -6,7 +6,7 @@
 namespace vlx::render {
 namespace {
 
-constexpr std::uint32_t kPoints = 1024;
+constexpr std::uint32_t kPoints = 512;
 
 /// Cosine of node `j` of `size`; never quite 0, where directions lie in the surface.
 float nodeCosine(std::size_t j, std::size_t size) {

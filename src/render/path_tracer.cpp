@@ -62,7 +62,9 @@ PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
     };
 
     for (int bounce = 0;; ++bounce) {
-        const std::optional<Hit> hit = accelerator_.intersect(ray, seed + static_cast<std::uint32_t>(bounce));
+        // Stochastic opacity: a seed of its own for every ray of the path.
+        const std::uint32_t raySeed = seed + 2 * static_cast<std::uint32_t>(bounce);
+        const std::optional<Hit> hit = accelerator_.intersect(ray, raySeed);
         if (!hit) {
             if (scene_.environment) {
                 const float w = chanceWeight([&] { return lights_.environmentPdf(receiver, ray.direction); });
@@ -113,8 +115,8 @@ PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
         if (lightsSampled) {
             const Vec2 u = sampler.pair(dimension::atBounce(bounce, dimension::kLight));
             const float choice = sampler.pair(dimension::atBounce(bounce, dimension::kLightChoice)).x;
-            result.radiance += throughput * directLight(point, frame, bsdf, receiver, choice, u,
-                                                        seed + static_cast<std::uint32_t>(bounce));
+            result.radiance +=
+                throughput * directLight(point, frame, bsdf, receiver, choice, u, raySeed + 1);
         }
 
         const Vec2 choice = sampler.pair(dimension::atBounce(bounce, dimension::kChoice));

@@ -143,20 +143,20 @@ SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirect
     p.position = a.position * w + b.position * hit.u + c.position * hit.v;
     Vec3 geometric = cross(b.position - a.position, c.position - a.position);
     Vec3 shading = a.normal * w + b.normal * hit.u + c.normal * hit.v;
+    // Vertices without a normal, or with normals that cancel out: the triangle's own.
+    const float norm = length(shading);
+    shading = norm > 1e-6f ? shading / norm : normalized(geometric);
     p.uv = textureCoordinates(scene, shape, p.triangle, hit.u, hit.v);
     if (p.material->normalTexture)
-        shading = mappedNormal(scene, shape, *p.material, corner, hit.u, hit.v, p.uv, normalized(shading));
+        shading = mappedNormal(scene, shape, *p.material, corner, hit.u, hit.v, p.uv, shading);
     if (shape.firstColour >= 0) p.colour = colourAt(scene, shape, corner, hit.u, hit.v).rgb;
     if (hit.instance >= 0) {
         const Transform& toWorld = scene.instances[static_cast<std::size_t>(hit.instance)].toWorld;
         p.position = toWorld.point(p.position);
         geometric = toWorld.normal(geometric);
-        shading = toWorld.normal(shading);
+        shading = normalized(toWorld.normal(shading));
     }
     geometric = normalized(geometric);
-    // Vertex normals that cancel out, or point away from the triangle's own front, are no use.
-    const float norm = length(shading);
-    shading = norm > 1e-12f ? shading / norm : geometric;
     if (dot(shading, geometric) < 0) shading = -shading;
 
     p.fromBehind = dot(geometric, rayDirection) > 0;
