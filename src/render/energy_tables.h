@@ -32,7 +32,7 @@ inline float normalReflectance(float ior) { return square((ior - 1) / (ior + 1))
 
 /// Albedo over the cosine to the normal and the roughness, and its cosine-weighted mean, for one index of
 /// refraction: what multiple-scattering compensation needs (Kulla, Conty, "Revisiting physically based shading
-/// at Imageworks", 2017). Computed once by quasi-Monte Carlo over visible normals; absolute error about 0.001.
+/// at Imageworks", 2017). Computed once by quasi-Monte Carlo over visible normals; energy is kept to 1 %.
 class AlbedoTable {
   public:
     explicit AlbedoTable(float ior);

@@ -104,7 +104,7 @@ TEST(WhiteFurnace, EveryWhiteSurfaceReturnsWhatItGets) {
     for (const Case& c : whiteCases()) {
         const Rgb energy = furnace(c);
         worst = std::max(worst, std::abs(energy.y - 1.0));
-        EXPECT_NEAR(energy.y, 1, 0.008) << label(c);
+        EXPECT_NEAR(energy.y, 1, 0.01) << label(c);
     }
     RecordProperty("worst", std::to_string(worst));
 }
