@@ -182,6 +182,7 @@ Accelerator::Accelerator(const Scene& scene) : impl_(new Impl(scene)) {
 Accelerator::~Accelerator() = default;
 
 std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed) const {
+    if (recorder_ != nullptr) recorder_->push_back({ray, 0, seed, false});
     RayContext context(seed);
     RTCRayHit r;
     r.ray = toEmbree(ray, std::numeric_limits<float>::infinity());
@@ -201,6 +202,7 @@ std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed) co
 }
 
 bool Accelerator::occluded(const Ray& ray, float distance, std::uint32_t seed) const {
+    if (recorder_ != nullptr) recorder_->push_back({ray, distance, seed, true});
     RayContext context(seed);
     RTCRay r = toEmbree(ray, distance);
     rtcOccluded1(impl_->top, &context, &r);

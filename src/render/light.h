@@ -30,7 +30,6 @@ struct Light {
     std::uint32_t shape = 0;
     float area = 0;
     Distribution triangles;        ///< chosen by power
-    std::vector<float> density;    ///< per triangle: probability / area
 
     /// Factor of the cone towards a unit vector that leaves the light.
     float cone(const Vec3& away) const {
@@ -112,19 +111,40 @@ class LightSampler {
     float environmentPdf(const Receiver& receiver, const Vec3& direction) const;
 
   private:
+    /// What choosing among the lights takes, close together in memory.
+    struct Candidate {
+        Vec3 position;
+        float radius = 0;
+        Vec3 direction;
+        float strength = 0;  ///< greatest channel
+        float area = 0;
+        float coneScale = 0;
+        float coneOffset = 1;
+        LightType type = LightType::Point;
+    };
+    /// A triangle of a mesh light.
+    struct EmitterTriangle {
+        Vec3 corner, edge1, edge2;
+        Vec3 normal;
+        float density = 0;  ///< probability / area
+    };
     struct Choice {
         std::size_t light = 0;
         float probability = 0;
     };
+    void addTriangles(const Light& light);
     Choice choose(const Receiver& receiver, float u) const;
     float probability(const Receiver& receiver, std::size_t light) const;
-    float importance(const Receiver& receiver, const Light& light) const;
+    static float importance(const Receiver& receiver, const Candidate& light);
 
-    LightSample sampleMesh(const Receiver& receiver, const Light& light, Vec2 u) const;
+    LightSample sampleMesh(const Receiver& receiver, std::size_t light, Vec2 u) const;
     LightSample sampleSphere(const Receiver& receiver, const Light& light, Vec2 u) const;
 
     const Scene* scene_;
     const std::vector<Light>& lights_;
+    std::vector<Candidate> candidates_;
+    std::vector<EmitterTriangle> triangles_;
+    std::vector<std::size_t> firstTriangle_;  ///< of each light, in triangles_
     Distribution byPower_;
     std::int64_t environmentLight_ = -1;
 };

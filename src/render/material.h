@@ -46,6 +46,9 @@ struct Material {
     /// Index into the scene's glass tables, -1 when not rough transmissive.
     int glassTable = -1;
 
+    /// Whether anything is to be looked up at a point; set by completeScene.
+    bool textured = false;
+
     bool emissive() const { return !isBlack(emission); }
     bool transmissive() const { return transmission > 0 && metallic < 1; }
     /// Seen from behind: double-sided, or a boundary of a solid that light crosses.
