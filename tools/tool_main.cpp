@@ -13,7 +13,10 @@ namespace vlx {
 
 namespace {
 
-int fail(const CLI::App& app, const std::string& message) {
+int fail(const CLI::App& app, std::string message) {
+    // Messages quote names out of files, which may hold what a terminal would obey.
+    for (char& c : message)
+        if ((static_cast<unsigned char>(c) < 32 && c != '\n') || c == 127) c = '?';
     std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), message.c_str());
     return kFailed;
 }

@@ -44,8 +44,8 @@ void integrate(std::span<unsigned char> values) {
         values[i] = static_cast<unsigned char>(values[i - 1] + values[i] - 128);
 }
 
-// OpenEXR's run lengths: a count byte c >= 0 says that the next byte stands c + 1 times, c < 0 that the next
-// -c bytes stand for themselves.
+// OpenEXR's run lengths: a byte c < 128 says that the next byte stands c + 1 times, c >= 128 that the next
+// 256 - c bytes stand for themselves.
 constexpr std::size_t kMinRun = 3;
 constexpr std::size_t kMaxRun = 128;
 constexpr std::size_t kMaxLiteral = 127;
@@ -82,11 +82,12 @@ std::size_t encodeRuns(Span data, unsigned char* to) {
 bool decodeRuns(Span packed, std::span<unsigned char> to) {
     std::size_t done = 0;
     for (std::size_t i = 0; i < packed.size();) {
-        const int count = static_cast<signed char>(packed[i++]);
-        const auto length = static_cast<std::size_t>(count < 0 ? -count : count + 1);
-        const std::size_t taken = count < 0 ? length : 1;
+        const std::size_t code = packed[i++];
+        const bool literal = code >= 128;
+        const std::size_t length = literal ? 256 - code : code + 1;
+        const std::size_t taken = literal ? length : 1;
         if (length > to.size() - done || taken > packed.size() - i) return false;
-        if (count < 0)
+        if (literal)
             std::copy_n(packed.data() + i, length, to.data() + done);
         else
             std::fill_n(to.data() + done, length, packed[i]);

@@ -21,6 +21,7 @@
 #include <limits>
 #include <set>
 
+#include "header_walker.h"
 #include "little_endian.h"
 #include "variolux/base/error.h"
 
@@ -39,9 +40,6 @@ constexpr char kRenderSeconds[] = "variolux:renderSeconds";
 constexpr char kMaxSamples[] = "maxSamplesPerPixel";
 constexpr char kWorldToCamera[] = "worldToCamera";
 constexpr char kWorldToNDC[] = "worldToNDC";
-
-// Longest name that OpenEXR writes.
-constexpr std::size_t kMaxName = 255;
 
 class MemoryInput : public Imf::IStream {
   public:
@@ -77,96 +75,6 @@ class MemoryOutput : public Imf::OStream {
     Bytes& bytes_;
     std::size_t at_ = 0;
 };
-
-struct RawAttribute {
-    std::string name;
-    std::string type;
-    std::size_t begin = 0;  // of name, type, size and value
-    std::size_t value = 0;
-    std::size_t end = 0;
-};
-
-// Walks over the bytes of a header without trusting a size in them.
-class Walker {
-  public:
-    Walker(const std::string& path, const Bytes& bytes, std::uint64_t fileBytes)
-        : path_(path), bytes_(bytes), fileBytes_(fileBytes) {}
-
-    std::size_t position() const { return at_; }
-    bool ranOut() const { return ranOut_; }
-
-    std::uint32_t word() {
-        if (!has(4)) return 0;
-        at_ += 4;
-        return loadWord(bytes_.data() + at_ - 4);
-    }
-
-    // The attributes up to the empty name that ends a header; none when the list of headers ends here.
-    std::vector<RawAttribute> header() {
-        std::vector<RawAttribute> attributes;
-        while (!ranOut_) {
-            RawAttribute attribute;
-            attribute.begin = at_;
-            attribute.name = text();
-            if (ranOut_ || attribute.name.empty()) break;
-            attribute.type = text();
-            const std::uint32_t size = word();
-            if (ranOut_) break;
-            if (size > fileBytes_ - std::min<std::uint64_t>(fileBytes_, at_))
-                throw Error(path_, "attribute '" + attribute.name + "' claims " + std::to_string(size) +
-                                       " bytes, the whole file has " + std::to_string(fileBytes_));
-            attribute.value = at_;
-            if (!has(size)) break;
-            at_ += size;
-            attribute.end = at_;
-            attributes.push_back(std::move(attribute));
-        }
-        return attributes;
-    }
-
-  private:
-    bool has(std::size_t count) {
-        if (count <= bytes_.size() - at_) return true;
-        if (bytes_.size() == fileBytes_) throw Error(path_, "truncated: the file ends within its header");
-        ranOut_ = true;
-        return false;
-    }
-
-    std::string text() {
-        std::string name;
-        while (has(1)) {
-            const char c = static_cast<char>(bytes_[at_++]);
-            if (c == 0) break;
-            name += c;
-            if (name.size() > kMaxName) throw Error(path_, "damaged header: an endless attribute name");
-        }
-        return name;
-    }
-
-    const std::string& path_;
-    const Bytes& bytes_;
-    const std::uint64_t fileBytes_;
-    std::size_t at_ = 0;
-    bool ranOut_ = false;
-};
-
-const RawAttribute* find(const std::vector<RawAttribute>& attributes, std::string_view name) {
-    for (const auto& attribute : attributes)
-        if (attribute.name == name) return &attribute;
-    return nullptr;
-}
-
-std::string rawText(const Bytes& bytes, const RawAttribute* attribute) {
-    if (attribute == nullptr || attribute->type != "string") return {};
-    return {bytes.begin() + static_cast<std::ptrdiff_t>(attribute->value),
-            bytes.begin() + static_cast<std::ptrdiff_t>(attribute->end)};
-}
-
-std::optional<std::int32_t> rawInt(const Bytes& bytes, const RawAttribute* attribute) {
-    if (attribute == nullptr || attribute->type != "int" || attribute->end - attribute->value != 4)
-        return std::nullopt;
-    return static_cast<std::int32_t>(loadWord(bytes.data() + attribute->value));
-}
 
 // OpenEXR's own header, of the attributes whose readers trust no size within their value.
 Imf::Header parse(const std::string& path, const Bytes& bytes, const std::vector<RawAttribute>& attributes,
@@ -375,7 +283,7 @@ std::string windowText(const Window& window) {
 }
 
 std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& start, std::uint64_t fileBytes) {
-    Walker walker(path, start, fileBytes);
+    HeaderWalker walker(path, start, fileBytes);
     if (fileBytes < 8 || walker.word() != static_cast<std::uint32_t>(Imf::MAGIC))
         throw Error(path, "expected an OpenEXR file, found something else");
     const int version = static_cast<int>(walker.word());
@@ -395,7 +303,7 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
     bool deepTiles = false;
     std::size_t part = 0;
     for (; part < parts.size(); ++part) {
-        const std::string type = rawText(start, find(parts[part], "type"));
+        const std::string type = rawText(start, findAttribute(parts[part], "type"));
         if (type == "deepscanline") break;
         deepTiles = deepTiles || type == "deeptile";
     }
@@ -405,21 +313,21 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
                               : "expected deep samples, found only flat pixels (vlx-pack stack makes a "
                                 "dump of images of different seeds)");
     for (const char* required : {"channels", "compression", "dataWindow"})
-        if (find(parts[part], required) == nullptr)
+        if (findAttribute(parts[part], required) == nullptr)
             throw Error(path, std::string("damaged header: attribute '") + required + "' is missing");
 
-    if (const int layout = rawInt(start, find(parts[part], "version")).value_or(1); layout != 1)
+    if (const int layout = rawInt(start, findAttribute(parts[part], "version")).value_or(1); layout != 1)
         throw Error(path, "expected deep data of version 1, found version " + std::to_string(layout));
 
     const Imf::Header parsed = parse(path, start, parts[part], version);
     header.dump = toDumpHeader(path, parsed);
-    if (find(parts[part], "displayWindow") == nullptr) header.dump.display = header.dump.data;
+    if (findAttribute(parts[part], "displayWindow") == nullptr) header.dump.display = header.dump.data;
     header.part = static_cast<int>(part);
 
     // The tables of the parts follow the headers, in the order of the parts.
     header.chunkTable = walker.position();
     for (std::size_t i = 0; i <= part; ++i) {
-        const auto chunks = rawInt(start, find(parts[i], "chunkCount"));
+        const auto chunks = rawInt(start, findAttribute(parts[i], "chunkCount"));
         if (i == part) {
             if (chunks.value_or(header.dump.data.height) != header.dump.data.height)
                 throw Error(path, "expected a chunk for each of " + std::to_string(header.dump.data.height) +
@@ -517,13 +425,13 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
         throw Error(path, std::string("this header cannot be written: ") + error.what());
     }
 
-    Walker walker(path, encoded.bytes, encoded.bytes.size());
+    HeaderWalker walker(path, encoded.bytes, encoded.bytes.size());
     walker.word();
     walker.word();
     walker.header();
     const auto samples = walker.header();
-    encoded.renderSeconds = find(samples, kRenderSeconds)->value;
-    encoded.maxSamplesPerPixel = find(samples, kMaxSamples)->value;
+    encoded.renderSeconds = findAttribute(samples, kRenderSeconds)->value;
+    encoded.maxSamplesPerPixel = findAttribute(samples, kMaxSamples)->value;
     return encoded;
 }
 

@@ -16,9 +16,9 @@
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
 
-// Why not OpenEXR's own reading classes: DeepScanLineInputPart allocates tables for the whole image before
-// anything is checked, and the unpacking of deep chunks in the C core of 3.1 trusts their sizes. Attributes
-// do go through OpenEXR.
+// Why not OpenEXR's own reading classes: they want a table of pointers to every pixel of the image in every
+// channel, before anything in the file has been checked, and are slower (tests/bench/dump_bench.cpp).
+// Attributes do go through OpenEXR.
 
 namespace vlx {
 

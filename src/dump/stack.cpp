@@ -3,11 +3,12 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
-#include <atomic>
+#include <bit>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
-#include <set>
+#include <optional>
 
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
