@@ -17,9 +17,9 @@ struct Hit {
     float u = 0;  ///< barycentric coordinates of the second and third corner
     float v = 0;
     std::uint32_t shape = 0;
-    std::uint32_t triangle = 0;   ///< of the shape
-    std::int32_t instance = -1;   ///< -1: the shape is in world space
-    std::int32_t light = -1;      ///< a sphere light's index, or -1: then the rest is meaningless
+    std::uint32_t triangle = 0;  ///< of the shape
+    std::int32_t instance = -1;  ///< -1: the shape is in world space
+    std::int32_t light = -1;     ///< a sphere light's index, or -1: then the rest is meaningless
 };
 
 /// A ray as it was asked for.

@@ -45,10 +45,10 @@ int tableOf(std::vector<Table>& tables, float ior) {
 void prepareMaterials(Scene& scene) {
     tableOf(scene.albedoTables, 1.5f);
     for (Material& material : scene.materials) {
-        material.textured = material.baseColourTexture || material.metallicRoughnessTexture ||
-                            material.emissionTexture || material.normalTexture || material.transmissionTexture ||
-                            material.specularTexture || material.specularColourTexture ||
-                            material.clearcoatTexture || material.clearcoatRoughnessTexture;
+        material.textured =
+            material.baseColourTexture || material.metallicRoughnessTexture || material.emissionTexture ||
+            material.normalTexture || material.transmissionTexture || material.specularTexture ||
+            material.specularColourTexture || material.clearcoatTexture || material.clearcoatRoughnessTexture;
         material.albedoTable = tableOf(scene.albedoTables, material.ior);
         if (material.transmissive() && square(material.roughness) >= kSmoothAlpha)
             material.glassTable = tableOf(scene.glassTables, material.ior);
@@ -90,7 +90,7 @@ Light meshLight(const Scene& scene, std::uint32_t index) {
         const Rgb emission = meanEmission(scene, shape, shape.firstTriangle + i);
         // A floor: the grid may have missed the bright part of a texture.
         powers[i] = part * std::max(maxComponent(emission),
-                                        1e-3f * maxComponent(scene.materials[shape.material].emission));
+                                    1e-3f * maxComponent(scene.materials[shape.material].emission));
         area += part;
         flux[0] += part * emission.x;
         flux[1] += part * emission.y;

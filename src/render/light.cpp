@@ -33,13 +33,15 @@ float LightSampler::importance(const Receiver& receiver, const Candidate& light)
         case LightType::Spot: {
             if (d2 == 0) return 0;
             const Vec3 direction = to / std::sqrt(d2);
-            const float cone = std::clamp(light.coneOffset - dot(direction, light.direction) * light.coneScale, 0.f, 1.f);
+            const float cone =
+                std::clamp(light.coneOffset - dot(direction, light.direction) * light.coneScale, 0.f, 1.f);
             return strength * cone * cone * cosineAt(receiver, direction) / d2;
         }
         case LightType::Directional:
             return strength * cosineAt(receiver, -light.direction);
         case LightType::Sphere:
-            return belowHorizon(receiver, to, light.radius) ? 0 : strength / std::max(d2, square(light.radius));
+            return belowHorizon(receiver, to, light.radius) ? 0
+                                                            : strength / std::max(d2, square(light.radius));
         case LightType::Mesh:
             return belowHorizon(receiver, to, light.radius)
                        ? 0
@@ -86,7 +88,8 @@ void LightSampler::addTriangles(const Light& light) {
     for (std::uint32_t i = 0; i < shape.triangles; ++i) {
         const auto& corner = scene_->triangles[shape.firstTriangle + i];
         const Vec3& p = scene_->vertices[corner[0]].position;
-        const Vec3 e1 = scene_->vertices[corner[1]].position - p, e2 = scene_->vertices[corner[2]].position - p;
+        const Vec3 e1 = scene_->vertices[corner[1]].position - p,
+                   e2 = scene_->vertices[corner[2]].position - p;
         const Vec3 n = cross(e1, e2);
         const float twiceArea = length(n);
         triangles_.push_back({p, e1, e2, n / twiceArea, light.triangles.probability(i) * 2 / twiceArea});
@@ -188,12 +191,13 @@ LightSample LightSampler::sample(const Receiver& receiver, float choice, Vec2 u)
             if (d2 == 0) return {};
             const float distance = std::sqrt(d2);
             const Vec3 direction = to / distance;
-            return {direction, distance * kReach, light.intensity * (light.cone(-direction) / d2),
-                    chosen.probability, true};
+            return {direction, distance * kReach,
+                    light.intensity * (light.cone(-direction) * light.window(d2) / d2), chosen.probability,
+                    true};
         }
         case LightType::Directional:
-            return {-light.direction, std::numeric_limits<float>::infinity(), light.intensity, chosen.probability,
-                    true};
+            return {-light.direction, std::numeric_limits<float>::infinity(), light.intensity,
+                    chosen.probability, true};
         case LightType::Sphere:
             s = sampleSphere(receiver, light, u);
             break;
@@ -203,7 +207,8 @@ LightSample LightSampler::sample(const Receiver& receiver, float choice, Vec2 u)
         case LightType::Environment: {
             const Environment& env = scene_->environment;
             const Environment::Sample e = env.sample(receiver.normal, receiver.bothSides, u);
-            s = {e.direction, std::numeric_limits<float>::infinity(), env.radiance(e.direction), e.pdf, false};
+            s = {e.direction, std::numeric_limits<float>::infinity(), env.radiance(e.direction), e.pdf,
+                 false};
             break;
         }
     }
@@ -213,8 +218,8 @@ LightSample LightSampler::sample(const Receiver& receiver, float choice, Vec2 u)
 
 float LightSampler::meshPdf(const Receiver& receiver, std::uint32_t light, std::uint32_t triangle,
                             float distance, float cosLight) const {
-    return probability(receiver, light) * triangles_[firstTriangle_[light] + triangle].density * square(distance) /
-           std::max(std::abs(cosLight), 1e-12f);
+    return probability(receiver, light) * triangles_[firstTriangle_[light] + triangle].density *
+           square(distance) / std::max(std::abs(cosLight), 1e-12f);
 }
 
 float LightSampler::spherePdf(const Receiver& receiver, std::uint32_t light) const {

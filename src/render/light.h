@@ -19,26 +19,29 @@ struct Light {
     std::string name;
     /// Point, Spot, Sphere: W/sr. Directional: W/m2 across the beam. Mesh: mean radiance.
     Rgb intensity;
-    Vec3 position;   ///< also the centre of a mesh light's bounds
-    Vec3 direction;  ///< unit, in which light travels (Spot, Directional, a spot's sphere)
+    Vec3 position;     ///< also the centre of a mesh light's bounds
+    Vec3 direction;    ///< unit, in which light travels (Spot, Directional, a spot's sphere)
     float radius = 0;  ///< of a sphere; of a mesh light's bounds
     /// KHR_lights_punctual's cone: factor clamp(cos x scale + offset, 0, 1)^2; 0 and 1 for all around.
     float coneScale = 0;
     float coneOffset = 1;
+    float range = 0;  ///< of Point and Spot; 0: without end
 
     // Mesh lights:
     std::uint32_t shape = 0;
     float area = 0;
-    Distribution triangles;        ///< chosen by power
+    Distribution triangles;  ///< chosen by power
 
     /// Factor of the cone towards a unit vector that leaves the light.
     float cone(const Vec3& away) const {
         return square(std::clamp(dot(away, direction) * coneScale + coneOffset, 0.f, 1.f));
     }
-    /// Radiance of a sphere light's surface towards `away`: intensity spread over its disk.
-    Rgb sphereRadiance(const Vec3& away) const {
-        return intensity * (cone(away) / (kPi * radius * radius));
+    /// KHR_lights_punctual's window (Point, Spot): 1 - (distance / range)^4, 0 beyond the range.
+    float window(float distanceSquared) const {
+        return range > 0 ? std::max(0.f, 1 - square(distanceSquared / (range * range))) : 1.f;
     }
+    /// Radiance of a sphere light's surface towards `away`: intensity spread over its disk.
+    Rgb sphereRadiance(const Vec3& away) const { return intensity * (cone(away) / (kPi * radius * radius)); }
 };
 
 /// Radiance from far away: nothing, a constant, or a latitude-longitude image (rows from +y down; its middle
@@ -86,9 +89,9 @@ struct Receiver {
 /// Direct light towards a receiver: a direction, what arrives along it unoccluded, and how likely it was.
 struct LightSample {
     Vec3 direction;
-    float distance = 0;    ///< of the shadow ray
-    Rgb radiance;          ///< for delta lights: irradiance across the beam
-    float pdf = 0;         ///< per solid angle, choice of light included; for delta lights the latter only
+    float distance = 0;  ///< of the shadow ray
+    Rgb radiance;        ///< for delta lights: irradiance across the beam
+    float pdf = 0;       ///< per solid angle, choice of light included; for delta lights the latter only
     bool delta = false;
 };
 

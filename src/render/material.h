@@ -19,7 +19,7 @@ struct Material {
     float opacity = 1;             ///< baseColorFactor's alpha
     TextureRef baseColourTexture;  ///< rgb: colour, a: opacity
     float metallic = 1;
-    float roughness = 1;  ///< perceptual; GGX alpha is its square
+    float roughness = 1;                  ///< perceptual; GGX alpha is its square
     TextureRef metallicRoughnessTexture;  ///< g: roughness, b: metallic
     Rgb emission{0, 0, 0};                ///< radiance: emissiveFactor x emissiveStrength
     TextureRef emissionTexture;

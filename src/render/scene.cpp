@@ -55,8 +55,9 @@ Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& materi
     const float norm = length(tangent);
     if (!(norm > 1e-12f)) return normal;
     tangent = tangent / norm;
-    const Rgb encoded =
-        scene.textures[static_cast<std::size_t>(material.normalTexture.texture)].lookup(uv.of(material.normalTexture)).rgb;
+    const Rgb encoded = scene.textures[static_cast<std::size_t>(material.normalTexture.texture)]
+                            .lookup(uv.of(material.normalTexture))
+                            .rgb;
     const Vec3 local{(2 * encoded.x - 1) * material.normalScale, (2 * encoded.y - 1) * material.normalScale,
                      2 * encoded.z - 1};
     const Vec3 mapped = tangent * local.x + cross(normal, tangent) * (sign * local.y) + normal * local.z;
@@ -123,8 +124,7 @@ Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triang
                         .lookup(uv.of(material.emissionTexture))
                         .rgb;
     }
-    if (material.clearcoat > 0)
-        emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
+    if (material.clearcoat > 0) emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
     return emission;
 }
 

@@ -54,8 +54,8 @@ Texture::Texture(int width, int height, std::vector<float> rgba, ColourSpace spa
 }
 
 Rgba Texture::texel(int x, int y) const {
-    const std::size_t i = 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                               static_cast<std::size_t>(x));
+    const std::size_t i =
+        4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x));
     if (!floats_.empty()) return {{floats_[i], floats_[i + 1], floats_[i + 2]}, floats_[i + 3]};
     const ByteTable& table = space_ == ColourSpace::Srgb ? kSrgbBytes : kLinearBytes;
     return {{table[bytes_[i]], table[bytes_[i + 1]], table[bytes_[i + 2]]}, kLinearBytes[bytes_[i + 3]]};

@@ -38,8 +38,18 @@ void shoot(RTCScene scene, const std::vector<RecordedRay>& rays) {
         rtcInitIntersectContext(&context);
         const Ray& ray = recorded.ray;
         RTCRayHit r;
-        r.ray = {ray.origin.x,    ray.origin.y,    ray.origin.z, 0, ray.direction.x, ray.direction.y,
-                 ray.direction.z, 0,               0,            0xffffffffu,        0, 0};
+        r.ray = {ray.origin.x,
+                 ray.origin.y,
+                 ray.origin.z,
+                 0,
+                 ray.direction.x,
+                 ray.direction.y,
+                 ray.direction.z,
+                 0,
+                 0,
+                 0xffffffffu,
+                 0,
+                 0};
         r.ray.tfar = recorded.shadow ? recorded.distance : std::numeric_limits<float>::infinity();
         r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
         r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -80,8 +90,7 @@ void TracerAgainstBareEmbree(benchmark::State& state) {
     state.counters["tracer_Mrays/s"] = total / tracing * 1e-6;
     state.counters["embree_Mrays/s"] = total / shooting * 1e-6;
     state.counters["ratio"] = shooting / tracing;
-    state.counters["us_a_sample"] =
-        tracing / static_cast<double>(state.iterations()) / (kSize * kSize) * 1e6;
+    state.counters["us_a_sample"] = tracing / static_cast<double>(state.iterations()) / (kSize * kSize) * 1e6;
 }
 BENCHMARK(TracerAgainstBareEmbree)->UseManualTime()->Unit(benchmark::kMillisecond);
 
