@@ -36,7 +36,8 @@ struct TraceCommand {
             "  vlx-trace room.glb -o room.exr --width 640 --spp 32\n"
             "  vlx-trace room.glb -o room.exr --hierarchical --tolerance 0.05 --seed 7\n"
             "  vlx-trace house.gltf -o house.exr --env sky.exr --camera kitchen --crop 100,50,64,64\n"
-            "The dump is a deep OpenEXR file: its part `beauty` is the plain average, its part `samples` holds\n"
+            "The dump is a deep OpenEXR file: its part `beauty` is the plain average, its part `samples` "
+            "holds\n"
             "every sample with position, albedo, normal and depth. vlx-krige reconstructs it.");
         app.add_option("SCENE", scene, "A glTF 2.0 scene, .glb or .gltf")->required();
         app.add_option("-o,--output", dump, "The dump to write (.exr)");
@@ -61,7 +62,8 @@ struct TraceCommand {
                 ->excludes(spp);
         app.add_option("--tolerance", options.refinement.tolerance,
                        "Hierarchical: the relative standard error of a pixel at which its cells are\n"
-                       "no longer refined; 0 takes all 256 samples")
+                       "no longer refined; 0 takes all 256 samples. Large values darken the image:\n"
+                       "cells that have not met rare bright paths stop early")
             ->check(CLI::NonNegativeNumber)
             ->needs(hierarchical)
             ->capture_default_str();
@@ -88,15 +90,17 @@ struct TraceCommand {
             ->check(CLI::Range(0, 4096))
             ->capture_default_str();
         using enum vlx::DumpCompression;
-        vlx::addChoice(app, "--compression", options.compression, {{"none", None}, {"rle", Rle}, {"zips", Zips}},
-                       "Of the dump. rle: hardly slows tracing down; zips: a fifth smaller");
+        vlx::addChoice(app, "--compression", options.compression,
+                       {{"none", None}, {"rle", Rle}, {"zips", Zips}},
+                       "Of the dump. rle: hardly slows tracing down; zips: a tenth smaller");
         app.add_flag("--json", json, "Print what was done as JSON on standard output");
     }
 
     int run() {
         if (dump.empty() && !listCameras) throw CLI::RequiredError("--output");
         if (environmentConstant.size() == 3)
-            environment.constant = Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
+            environment.constant =
+                Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
         const vlx::ThreadLimit limit(threads);
         const Scene loaded = loadScene(scene, environment);
         if (listCameras) return printCameras(loaded);
@@ -116,13 +120,16 @@ struct TraceCommand {
             report = renderDump(loaded, accelerator, dump, options, bar);
         }
         if (report.nonFinite > 0)
-            note("warning: " + std::to_string(report.nonFinite) + " samples overflowed and were written as black");
+            note("warning: " + std::to_string(report.nonFinite) +
+                 " samples overflowed and were written as black");
         summarize(loaded, report);
         return vlx::kDone;
     }
 
   private:
-    void note(const std::string& text) const { std::fprintf(stderr, "%s: %s\n", scene.c_str(), text.c_str()); }
+    void note(const std::string& text) const {
+        std::fprintf(stderr, "%s: %s\n", scene.c_str(), text.c_str());
+    }
 
     int printCameras(const Scene& loaded) const {
         for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
@@ -137,7 +144,8 @@ struct TraceCommand {
         if (camera.empty()) return loaded.activeCamera;
         for (std::size_t i = 0; i < loaded.cameras.size(); ++i)
             if (loaded.cameras[i].name == camera) return i;
-        const bool isNumber = camera.find_first_not_of("0123456789") == std::string::npos && camera.size() < 9;
+        const bool isNumber =
+            camera.find_first_not_of("0123456789") == std::string::npos && camera.size() < 9;
         if (isNumber && std::stoul(camera) < loaded.cameras.size()) return std::stoul(camera);
         std::string names;
         for (const Camera& c : loaded.cameras) names += (names.empty() ? "'" : ", '") + c.name + "'";

@@ -43,9 +43,8 @@ void filter(const RTCFilterFunctionNArguments* args) {
         }
         if (!data.seeThroughOpacity) continue;
         const unsigned int triangle = RTCHitN_primID(args->hit, args->N, i);
-        const float opacity =
-            opacityAt(*data.scene, *data.shape, data.shape->firstTriangle + triangle,
-                      RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i));
+        const float opacity = opacityAt(*data.scene, *data.shape, data.shape->firstTriangle + triangle,
+                                        RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i));
         if (opacity >= 1) continue;
         const std::uint64_t hash = hashOf(context->seed, RTCHitN_geomID(args->hit, args->N, i), triangle,
                                           RTCHitN_instID(args->hit, args->N, i, 0));
@@ -108,8 +107,8 @@ struct Accelerator::Impl {
         rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                    scene.vertices.data(), 0, sizeof(Vertex), scene.vertices.size());
         rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                   scene.triangles.data() + shape.firstTriangle, 0, sizeof(scene.triangles[0]),
-                                   shape.triangles);
+                                   scene.triangles.data() + shape.firstTriangle, 0,
+                                   sizeof(scene.triangles[0]), shape.triangles);
         const Material& material = scene.materials[shape.material];
         FilterData& data = filters[index];
         data = {&scene, &shape, !material.visibleFromBehind(), material.alphaMode != AlphaMode::Opaque};
@@ -144,7 +143,8 @@ struct Accelerator::Impl {
         rtcSetGeometryInstancedScene(geometry, groups[instance.group]);
         std::array<float, 12> rows;
         for (std::size_t i = 0; i < 3; ++i)
-            for (std::size_t j = 0; j < 4; ++j) rows[i * 4 + j] = static_cast<float>(instance.toWorld.m[i][j]);
+            for (std::size_t j = 0; j < 4; ++j)
+                rows[i * 4 + j] = static_cast<float>(instance.toWorld.m[i][j]);
         rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, rows.data());
         rtcCommitGeometry(geometry);
         rtcAttachGeometryByID(top, geometry, id);
@@ -154,7 +154,8 @@ struct Accelerator::Impl {
     void build() {
         for (const Group& group : scene.groups) {
             groups.push_back(newScene());
-            for (std::uint32_t i = 0; i < group.shapes; ++i) attachShape(groups.back(), group.firstShape + i, i);
+            for (std::uint32_t i = 0; i < group.shapes; ++i)
+                attachShape(groups.back(), group.firstShape + i, i);
             rtcJoinCommitScene(groups.back());
         }
         top = newScene();
@@ -182,6 +183,7 @@ Accelerator::Accelerator(const Scene& scene) : impl_(new Impl(scene)) {
 Accelerator::~Accelerator() = default;
 
 std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed) const {
+    if (recorder_ != nullptr) recorder_->push_back({ray, 0, seed, false});
     RayContext context(seed);
     RTCRayHit r;
     r.ray = toEmbree(ray, std::numeric_limits<float>::infinity());
@@ -201,6 +203,7 @@ std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed) co
 }
 
 bool Accelerator::occluded(const Ray& ray, float distance, std::uint32_t seed) const {
+    if (recorder_ != nullptr) recorder_->push_back({ray, distance, seed, true});
     RayContext context(seed);
     RTCRay r = toEmbree(ray, distance);
     rtcOccluded1(impl_->top, &context, &r);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "vec.h"
 
@@ -16,9 +17,17 @@ struct Hit {
     float u = 0;  ///< barycentric coordinates of the second and third corner
     float v = 0;
     std::uint32_t shape = 0;
-    std::uint32_t triangle = 0;   ///< of the shape
-    std::int32_t instance = -1;   ///< -1: the shape is in world space
-    std::int32_t light = -1;      ///< a sphere light's index, or -1: then the rest is meaningless
+    std::uint32_t triangle = 0;  ///< of the shape
+    std::int32_t instance = -1;  ///< -1: the shape is in world space
+    std::int32_t light = -1;     ///< a sphere light's index, or -1: then the rest is meaningless
+};
+
+/// A ray as it was asked for.
+struct RecordedRay {
+    Ray ray;
+    float distance = 0;  ///< of a shadow ray
+    std::uint32_t seed = 0;
+    bool shadow = false;
 };
 
 /// Hit tests through Embree: a static scene, robust (watertight) traversal. Surfaces that let rays through
@@ -38,12 +47,15 @@ class Accelerator {
     /// Whether something lies on the ray before `distance`.
     bool occluded(const Ray& ray, float distance, std::uint32_t seed) const;
 
-    /// The Embree scene (RTCScene), for the benchmark.
+    /// For benchmarks: every ray from now on is appended to `rays` (null: no longer). One thread only.
+    void record(std::vector<RecordedRay>* rays) { recorder_ = rays; }
+    /// For benchmarks: the RTCScene.
     void* embreeScene() const;
 
   private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
+    std::vector<RecordedRay>* recorder_ = nullptr;
 };
 
 }  // namespace vlx::render

@@ -62,7 +62,8 @@ Bsdf::Bsdf(const SurfaceParameters& s, const Vec3& wo, bool fromInside, const Al
 
     const Rgb entering = Rgb(1) - dielectricAlbedo(atO);
     const Rgb meanDielectric = dielectricAlbedo(mean);
-    const Rgb rest{inverseRest(meanDielectric.x), inverseRest(meanDielectric.y), inverseRest(meanDielectric.z)};
+    const Rgb rest{inverseRest(meanDielectric.x), inverseRest(meanDielectric.y),
+                   inverseRest(meanDielectric.z)};
     const Rgb body = minimum(s.baseColour * rest, 1.f) * entering * (opaque_ * base_);
     diffuse_ = body * rest;
 

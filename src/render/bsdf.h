@@ -7,8 +7,8 @@
 
 namespace vlx::render {
 
-/// A material's parameters at one point, textures applied. Ranges: colours, metallic, roughness, transmission,
-/// specular, clearcoat and clearcoatRoughness in [0, 1]; ior >= 1.
+/// A material's parameters at one point, textures applied. Ranges: colours, metallic, roughness,
+/// transmission, specular, clearcoat and clearcoatRoughness in [0, 1]; ior >= 1.
 struct SurfaceParameters {
     Rgb baseColour{1, 1, 1};
     float metallic = 0;
@@ -30,10 +30,10 @@ struct BsdfValue {
 };
 
 struct BsdfSample {
-    Vec3 wi;                ///< local
-    Rgb weight;             ///< f |cos wi| / pdf; 0: the path ends here
-    float pdf = 0;          ///< of all lobes together; meaningless for delta lobes
-    bool delta = false;     ///< perfectly smooth reflection or refraction
+    Vec3 wi;             ///< local
+    Rgb weight;          ///< f |cos wi| / pdf; 0: the path ends here
+    float pdf = 0;       ///< of all lobes together; meaningless for delta lobes
+    bool delta = false;  ///< perfectly smooth reflection or refraction
 };
 
 /// Scattering at a point of a glTF surface, in the local frame whose z axis is the shading normal on the
@@ -43,12 +43,15 @@ struct BsdfSample {
 ///
 /// - reflection: GGX, height-correlated Smith; Fresnel from f0 to f90 along Schlick's curve for metals (f0 =
 ///   base colour) and along the exact one for dielectrics (f0 = ((ior-1)/(ior+1))^2 x specular x
-///   specularColour, f90 = specular). Energy lost to multiple scattering is returned by Kulla and Conty's lobe.
-/// - diffuse: c / pi x (1-Ed(wo)) (1-Ed(wi)) / (1 - mean Ed), Ed being the dielectric reflection's albedo: what
+///   specularColour, f90 = specular). Energy lost to multiple scattering is returned by Kulla and Conty's
+///   lobe.
+/// - diffuse: c / pi x (1-Ed(wo)) (1-Ed(wi)) / (1 - mean Ed), Ed being the dielectric reflection's albedo:
+/// what
 ///   is not reflected enters. Reciprocal. c = min(1, base colour / (1 - mean Ed)), so that the base colour is
 ///   the diffuse reflectance that one sees beneath the reflection (as in Disney's and Cycles' models, which
 ///   take nothing off it), as far as energy allows: a white surface returns exactly what it gets.
-/// - glass (weight (1-metallic) transmission): reflection and refraction by the exact Fresnel term, refraction
+/// - glass (weight (1-metallic) transmission): reflection and refraction by the exact Fresnel term,
+/// refraction
 ///   tinted by the base colour; rough glass is divided by its single-scattering albedo. The surface bounds a
 ///   solid: light refracts on entering and on leaving. What is carried is basic radiance L / n^2, n being the
 ///   index of the medium, which refraction leaves as it is; emission is given in it too.
@@ -106,19 +109,19 @@ class Bsdf {
 
     float coat_;  ///< clearcoat factor
     float coatAlbedo_ = 0;
-    float base_;               ///< 1 - coatAlbedo_
-    float metal_;              ///< how much of each there is: metal,
-    float opaque_;             ///< opaque dielectric
+    float base_;    ///< 1 - coatAlbedo_
+    float metal_;   ///< how much of each there is: metal,
+    float opaque_;  ///< opaque dielectric
     Rgb metalF0_;
     Rgb dielectricF0_;
     float dielectricF90_;
-    Rgb dielectricMultiple_;   ///< Kulla and Conty's factor of the dielectric
-    Rgb multiple_;             ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
-    Rgb diffuse_;              ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
-    float glassWeight_;        ///< includes the multiple-scattering compensation
+    Rgb dielectricMultiple_;  ///< Kulla and Conty's factor of the dielectric
+    Rgb multiple_;            ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
+    Rgb diffuse_;             ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
+    float glassWeight_;       ///< includes the multiple-scattering compensation
     Rgb glassTint_;
     float ior_;
-    float eta_;                ///< far side over near side
+    float eta_;  ///< far side over near side
     float exactF0_;
     AlbedoTable::Row row_;
     Rgb albedo_;

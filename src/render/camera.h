@@ -11,7 +11,7 @@ namespace vlx::render {
 /// A glTF perspective camera: looks along its own -z, y up.
 struct Camera {
     std::string name;
-    Transform toWorld;        ///< rotation and translation
+    Transform toWorld;         ///< rotation and translation
     float verticalFov = 0.8f;  ///< radians
     float aspect = 0;          ///< width / height; 0: as the image
     float lensRadius = 0;      ///< metres; 0: pinhole

@@ -42,9 +42,13 @@ int tableOf(std::vector<Table>& tables, float ior) {
     return static_cast<int>(found - tables.begin());
 }
 
-void setTables(Scene& scene) {
+void prepareMaterials(Scene& scene) {
     tableOf(scene.albedoTables, 1.5f);
     for (Material& material : scene.materials) {
+        material.textured =
+            material.baseColourTexture || material.metallicRoughnessTexture || material.emissionTexture ||
+            material.normalTexture || material.transmissionTexture || material.specularTexture ||
+            material.specularColourTexture || material.clearcoatTexture || material.clearcoatRoughnessTexture;
         material.albedoTable = tableOf(scene.albedoTables, material.ior);
         if (material.transmissive() && square(material.roughness) >= kSmoothAlpha)
             material.glassTable = tableOf(scene.glassTables, material.ior);
@@ -72,7 +76,7 @@ Light meshLight(const Scene& scene, std::uint32_t index) {
     light.type = LightType::Mesh;
     light.name = scene.materials[shape.material].name;
     light.shape = index;
-    std::vector<float> areas(shape.triangles), powers(shape.triangles);
+    std::vector<float> powers(shape.triangles);
     double area = 0;
     double flux[3] = {0, 0, 0};
     constexpr float inf = std::numeric_limits<float>::infinity();
@@ -82,15 +86,15 @@ Light meshLight(const Scene& scene, std::uint32_t index) {
         const Vec3& a = scene.vertices[corner[0]].position;
         const Vec3& b = scene.vertices[corner[1]].position;
         const Vec3& c = scene.vertices[corner[2]].position;
-        areas[i] = 0.5f * length(cross(b - a, c - a));
+        const float part = 0.5f * length(cross(b - a, c - a));
         const Rgb emission = meanEmission(scene, shape, shape.firstTriangle + i);
         // A floor: the grid may have missed the bright part of a texture.
-        powers[i] = areas[i] * std::max(maxComponent(emission),
-                                        1e-3f * maxComponent(scene.materials[shape.material].emission));
-        area += areas[i];
-        flux[0] += areas[i] * emission.x;
-        flux[1] += areas[i] * emission.y;
-        flux[2] += areas[i] * emission.z;
+        powers[i] = part * std::max(maxComponent(emission),
+                                    1e-3f * maxComponent(scene.materials[shape.material].emission));
+        area += part;
+        flux[0] += part * emission.x;
+        flux[1] += part * emission.y;
+        flux[2] += part * emission.z;
         for (const Vec3& p : {a, b, c}) {
             low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
             high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
@@ -104,9 +108,6 @@ Light meshLight(const Scene& scene, std::uint32_t index) {
     light.position = (low + high) * 0.5f;
     light.radius = 0.5f * length(high - low);
     light.triangles = Distribution(powers);
-    light.density.resize(shape.triangles);
-    for (std::uint32_t i = 0; i < shape.triangles; ++i)
-        light.density[i] = light.triangles.probability(i) / areas[i];
     return light;
 }
 
@@ -114,7 +115,7 @@ Light meshLight(const Scene& scene, std::uint32_t index) {
 
 void completeScene(Scene& scene) {
     setBounds(scene);
-    setTables(scene);
+    prepareMaterials(scene);
     for (std::uint32_t i = 0; i < scene.worldShapes; ++i) {
         if (!scene.materials[scene.shapes[i].material].emissive()) continue;
         scene.shapes[i].light = static_cast<std::int32_t>(scene.lights.size());

@@ -32,10 +32,7 @@ std::vector<std::string> sceneEffects(const Scene& scene, const Camera& camera, 
     anyMaterial("transmission", [&](const Material& m) { return m.transmissive() && smooth(m); });
     anyMaterial("rough_transmission", [&](const Material& m) { return m.transmissive() && !smooth(m); });
     anyMaterial("clearcoat", [](const Material& m) { return m.clearcoat > 0; });
-    anyMaterial("textures", [](const Material& m) {
-        return m.baseColourTexture || m.metallicRoughnessTexture || m.emissionTexture || m.transmissionTexture ||
-               m.specularTexture || m.specularColourTexture || m.clearcoatTexture || m.clearcoatRoughnessTexture;
-    });
+    anyMaterial("textures", [](const Material& m) { return m.textured; });
     anyMaterial("normal_maps", [](const Material& m) { return static_cast<bool>(m.normalTexture); });
     anyMaterial("alpha", [](const Material& m) { return m.alphaMode != AlphaMode::Opaque; });
     anyLight("emissive_meshes", [](LightType t) { return t == LightType::Mesh; });

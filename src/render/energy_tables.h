@@ -21,8 +21,8 @@ struct Albedo {
     }
 };
 
-/// How far the exact Fresnel reflectance at cosTheta has risen from normal (0) to grazing incidence (1). Where
-/// glTF's sample code has Schlick's (1 - cos)^5: that is 15 % too low at 65 degrees for glass.
+/// How far the exact Fresnel reflectance at cosTheta has risen from normal (0) to grazing incidence (1).
+/// Where glTF's sample code has Schlick's (1 - cos)^5: that is 15 % too low at 65 degrees for glass.
 inline float dielectricWeight(float cosTheta, float eta, float f0) {
     return f0 < 1 ? std::max(0.f, (dielectricFresnel(cosTheta, eta) - f0) / (1 - f0)) : 1.f;
 }
@@ -31,8 +31,9 @@ inline float dielectricWeight(float cosTheta, float eta, float f0) {
 inline float normalReflectance(float ior) { return square((ior - 1) / (ior + 1)); }
 
 /// Albedo over the cosine to the normal and the roughness, and its cosine-weighted mean, for one index of
-/// refraction: what multiple-scattering compensation needs (Kulla, Conty, "Revisiting physically based shading
-/// at Imageworks", 2017). Computed once by quasi-Monte Carlo over visible normals; absolute error about 0.001.
+/// refraction: what multiple-scattering compensation needs (Kulla, Conty, "Revisiting physically based
+/// shading at Imageworks", 2017). Computed once by quasi-Monte Carlo over visible normals; energy is kept to
+/// 1 %.
 class AlbedoTable {
   public:
     explicit AlbedoTable(float ior);

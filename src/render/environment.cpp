@@ -18,7 +18,8 @@ Environment::Environment(int width, int height, std::vector<Rgb> pixels)
         double sum = 0;
         // Solid angle of a pixel of this row, as a fraction of the sphere.
         const double top = std::cos(std::numbers::pi * static_cast<double>(y) / static_cast<double>(h));
-        const double bottom = std::cos(std::numbers::pi * static_cast<double>(y + 1) / static_cast<double>(h));
+        const double bottom =
+            std::cos(std::numbers::pi * static_cast<double>(y + 1) / static_cast<double>(h));
         const double part = 0.5 * (top - bottom) / static_cast<double>(w);
         for (std::size_t x = 0; x < w; ++x) {
             const Rgb& p = pixels_[y * w + x];
@@ -46,7 +47,8 @@ PixelIndex pixelOf(const Vec3& d, int width, int height) {
     const float phi = std::atan2(d.x, -d.z);  // 0 in the middle, positive to the right
     const float theta = std::acos(std::clamp(d.y, -1.f, 1.f));
     const auto index = [](float t, int size) {
-        return static_cast<std::size_t>(std::clamp(static_cast<int>(t * static_cast<float>(size)), 0, size - 1));
+        return static_cast<std::size_t>(
+            std::clamp(static_cast<int>(t * static_cast<float>(size)), 0, size - 1));
     };
     return {index(phi / (2 * kPi) + 0.5f, width), index(theta / kPi, height)};
 }

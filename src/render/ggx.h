@@ -49,8 +49,8 @@ inline float schlickWeight(float cosTheta) {
     return m2 * m2 * m;
 }
 
-/// Reflectance of a dielectric boundary for unpolarised light; cosTheta >= 0 on the incident side, eta = index
-/// of the far side over the near side's. 1 under total internal reflection.
+/// Reflectance of a dielectric boundary for unpolarised light; cosTheta >= 0 on the incident side, eta =
+/// index of the far side over the near side's. 1 under total internal reflection.
 inline float dielectricFresnel(float cosTheta, float eta) {
     const float sin2 = (1 - cosTheta * cosTheta) / (eta * eta);
     if (sin2 >= 1) return 1;

@@ -29,7 +29,8 @@ std::uint32_t word(const std::vector<unsigned char>& bytes, std::size_t offset) 
 /// Whether the chunks of a binary glTF file lie inside it.
 void checkChunks(const std::string& path, const std::vector<unsigned char>& bytes) {
     const std::size_t size = bytes.size();
-    if (size < 20) throw Error(path, "truncated: a binary glTF header has 20 bytes, found " + std::to_string(size));
+    if (size < 20)
+        throw Error(path, "truncated: a binary glTF header has 20 bytes, found " + std::to_string(size));
     const std::size_t length = word(bytes, 8);
     if (length > size)
         throw Error(path, "truncated: the header says " + std::to_string(length) + " bytes, the file has " +
@@ -41,8 +42,8 @@ void checkChunks(const std::string& path, const std::vector<unsigned char>& byte
 }
 
 /// Images of their own files are kept encoded; those in buffers are read from there when wanted.
-bool keepEncoded(tinygltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* bytes,
-                 int size, void*) {
+bool keepEncoded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
+                 const unsigned char* bytes, int size, void*) {
     if (image->bufferView < 0 && size > 0) image->image.assign(bytes, bytes + size);
     return true;
 }
@@ -133,16 +134,17 @@ std::span<const unsigned char> GltfFile::rangeOf(int bufferView, std::size_t off
     const bool fits = offset <= bytes.size() && size <= bytes.size() - offset &&
                       (count - 1) <= (bytes.size() - offset - size) / stride;
     if (!fits)
-        fail(what + " needs " + std::to_string(count) + " elements of " + std::to_string(size) + " bytes from byte " +
-             std::to_string(offset) + " on, bufferView " + std::to_string(bufferView) + " has " +
-             std::to_string(bytes.size()) + " bytes");
+        fail(what + " needs " + std::to_string(count) + " elements of " + std::to_string(size) +
+             " bytes from byte " + std::to_string(offset) + " on, bufferView " + std::to_string(bufferView) +
+             " has " + std::to_string(bytes.size()) + " bytes");
     return bytes.subspan(offset);
 }
 
 std::vector<double> GltfFile::values(int index, int components, const std::string& what) const {
     const tinygltf::Accessor& a = accessorAt(index, what);
     const int componentBytes = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(a.componentType));
-    if (tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(a.type)) != components || componentBytes <= 0)
+    if (tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(a.type)) != components ||
+        componentBytes <= 0)
         fail(what + ": accessor " + std::to_string(index) + " must have " + std::to_string(components) +
              " components of a glTF type");
     const auto width = static_cast<std::size_t>(components);
@@ -157,10 +159,12 @@ std::vector<double> GltfFile::values(int index, int components, const std::strin
         out.resize(a.count * width);
         for (std::size_t i = 0; i < a.count; ++i)
             for (std::size_t c = 0; c < width; ++c)
-                out[i * width + c] = component(bytes.data() + i * stride + c * unit, a.componentType, a.normalized);
+                out[i * width + c] =
+                    component(bytes.data() + i * stride + c * unit, a.componentType, a.normalized);
     } else {
         // Zeros, as the specification says; bounded, as no bytes vouch for the count.
-        if (a.count > (std::size_t{1} << 28)) fail(what + " has " + std::to_string(a.count) + " elements without data");
+        if (a.count > (std::size_t{1} << 28))
+            fail(what + " has " + std::to_string(a.count) + " elements without data");
         out.resize(a.count * width);
     }
     if (a.sparse.isSparse) {
@@ -170,16 +174,19 @@ std::vector<double> GltfFile::values(int index, int components, const std::strin
         if (indexBytes <= 0 || a.sparse.indices.byteOffset < 0 || a.sparse.values.byteOffset < 0)
             fail(what + ": accessor " + std::to_string(index) + " has a broken sparse part");
         const auto step = static_cast<std::size_t>(indexBytes);
-        const auto where = rangeOf(a.sparse.indices.bufferView, static_cast<std::size_t>(a.sparse.indices.byteOffset),
-                                   count, step, step, what);
-        const auto with = rangeOf(a.sparse.values.bufferView, static_cast<std::size_t>(a.sparse.values.byteOffset),
-                                  count, size, size, what);
+        const auto where =
+            rangeOf(a.sparse.indices.bufferView, static_cast<std::size_t>(a.sparse.indices.byteOffset), count,
+                    step, step, what);
+        const auto with =
+            rangeOf(a.sparse.values.bufferView, static_cast<std::size_t>(a.sparse.values.byteOffset), count,
+                    size, size, what);
         for (std::size_t i = 0; i < count; ++i) {
             const auto target = static_cast<std::size_t>(
                 component(where.data() + i * step, a.sparse.indices.componentType, false));
             if (target >= a.count) fail(what + ": a sparse index is " + std::to_string(target));
             for (std::size_t c = 0; c < width; ++c)
-                out[target * width + c] = component(with.data() + i * size + c * unit, a.componentType, a.normalized);
+                out[target * width + c] =
+                    component(with.data() + i * size + c * unit, a.componentType, a.normalized);
         }
     }
     return out;

@@ -39,7 +39,8 @@ class GltfFile {
     const tinygltf::Accessor& accessorAt(int index, const std::string& what) const;
     std::span<const unsigned char> viewBytes(int bufferView, const std::string& what) const;
     std::span<const unsigned char> rangeOf(int bufferView, std::size_t offset, std::size_t count,
-                                           std::size_t stride, std::size_t size, const std::string& what) const;
+                                           std::size_t stride, std::size_t size,
+                                           const std::string& what) const;
     std::vector<double> values(int accessor, int components, const std::string& what) const;
 
     std::string path_;

@@ -42,15 +42,16 @@ std::vector<std::uint32_t> GeometryReader::triangleIndices(const tinygltf::Primi
     }
     for (std::size_t i = 0; i < list.size(); ++i)
         if (list[i] >= vertices)
-            file_.fail(what + ": index " + std::to_string(i) + " is " + std::to_string(list[i]) + ", it has " +
-                       std::to_string(vertices) + " vertices");
+            file_.fail(what + ": index " + std::to_string(i) + " is " + std::to_string(list[i]) +
+                       ", it has " + std::to_string(vertices) + " vertices");
     std::vector<std::uint32_t> corners;
     const std::size_t n = list.size();
     if (primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP) {
         for (std::size_t i = 0; i + 2 < n; ++i)
             corners.insert(corners.end(), {list[i], list[i + 1 + i % 2], list[i + 2 - i % 2]});
     } else if (primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN) {
-        for (std::size_t i = 1; i + 1 < n; ++i) corners.insert(corners.end(), {list[i], list[i + 1], list[0]});
+        for (std::size_t i = 1; i + 1 < n; ++i)
+            corners.insert(corners.end(), {list[i], list[i + 1], list[0]});
     } else {
         list.resize(n - n % 3);
         corners = std::move(list);
@@ -68,7 +69,8 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Tr
         scene_.report.warnings.push_back(what + ": points and lines are left out");
         return;
     }
-    if (!primitive.targets.empty()) scene_.report.warnings.push_back(what + ": morph targets are left at rest");
+    if (!primitive.targets.empty())
+        scene_.report.warnings.push_back(what + ": morph targets are left at rest");
 
     const int positionAccessor = attribute(primitive, "POSITION");
     if (positionAccessor < 0) file_.fail(what + " has no POSITION");
@@ -81,7 +83,8 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Tr
         if (accessor < 0) return std::vector<float>();
         std::vector<float> v = file_.floats(accessor, components, what + " " + name);
         if (v.size() != count * static_cast<std::size_t>(components))
-            file_.fail(what + " " + name + " has " + std::to_string(v.size() / static_cast<std::size_t>(components)) +
+            file_.fail(what + " " + name + " has " +
+                       std::to_string(v.size() / static_cast<std::size_t>(components)) +
                        " elements, POSITION " + std::to_string(count));
         return v;
     };
@@ -139,7 +142,8 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Tr
     }
     if (!secondUvs.empty()) {
         shape.firstSecondUv = static_cast<std::int64_t>(scene_.secondUvs.size());
-        for (std::size_t i = 0; i < count; ++i) scene_.secondUvs.push_back({secondUvs[2 * i], secondUvs[2 * i + 1]});
+        for (std::size_t i = 0; i < count; ++i)
+            scene_.secondUvs.push_back({secondUvs[2 * i], secondUvs[2 * i + 1]});
     }
     if (!colours.empty()) {
         shape.firstColour = static_cast<std::int64_t>(scene_.colours.size());

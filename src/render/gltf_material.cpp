@@ -3,6 +3,8 @@
 namespace vlx::render {
 namespace {
 
+constexpr double kMostIor = 1000;
+
 float unit(double v) { return static_cast<float>(std::clamp(std::isnan(v) ? 0.0 : v, 0.0, 1.0)); }
 
 /// Three numbers >= 0.
@@ -119,9 +121,10 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     if (const auto* e = extension(source.extensions, "KHR_materials_emissive_strength"))
         m.emission *= static_cast<float>(std::clamp(number(*e, "emissiveStrength", 1), 0.0, 1e30));
     if (const auto* e = extension(source.extensions, "KHR_materials_ior")) {
-        const double ior = number(*e, "ior", 1.5);
-        if (!(ior >= 1 && ior <= 1e3))
-            file_.fail(what + " has ior " + std::to_string(ior) + ", expected 1 or more");
+        double ior = number(*e, "ior", 1.5);
+        if (ior == 0) ior = kMostIor;  // the specification's "reflects everything"
+        if (!(ior >= 1 && ior <= kMostIor))
+            file_.fail(what + " has ior " + std::to_string(ior) + ", expected 1 to 1000 (or 0)");
         m.ior = static_cast<float>(ior);
     }
     if (const auto* e = extension(source.extensions, "KHR_materials_specular")) {

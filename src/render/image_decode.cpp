@@ -59,7 +59,8 @@ Texture GltfFile::image(int index, ColourSpace space) const {
     const std::string what = described("image", static_cast<std::size_t>(index), source.name);
     std::span<const unsigned char> bytes = source.image;
     if (source.bufferView >= 0) bytes = viewBytes(source.bufferView, what);
-    if (bytes.empty()) fail(what + " has no data" + (source.uri.empty() ? "" : ": '" + source.uri + "' is missing"));
+    if (bytes.empty())
+        fail(what + " has no data" + (source.uri.empty() ? "" : ": '" + source.uri + "' is missing"));
     const std::string format = formatOf(bytes);
     if (format.empty()) fail(what + " is neither PNG nor JPEG nor WebP");
 
@@ -100,8 +101,8 @@ Environment loadEnvironment(const std::string& path) {
             const Rgb value{p[r], p[g], p[b]};
             if (!isFinite(value) || value.x < 0 || value.y < 0 || value.z < 0)
                 throw Error(path, "expected finite radiance >= 0, found (" + std::to_string(value.x) + ", " +
-                                      std::to_string(value.y) + ", " + std::to_string(value.z) + ") at column " +
-                                      std::to_string(col) + ", row " + std::to_string(row));
+                                      std::to_string(value.y) + ", " + std::to_string(value.z) +
+                                      ") at column " + std::to_string(col) + ", row " + std::to_string(row));
             pixels.push_back(value);
         }
     }

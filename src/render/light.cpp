@@ -13,9 +13,8 @@ constexpr float kEvenPart = 0.1f;
 constexpr float kReach = 1 - 1e-4f;
 
 /// Of light towards a receiver, the part above its horizon as far as its bounds tell.
-bool belowHorizon(const Receiver& receiver, const Light& light) {
-    return !receiver.bothSides &&
-           dot(light.position - receiver.position, receiver.normal) <= -light.radius * 1.001f;
+bool belowHorizon(const Receiver& receiver, const Vec3& toCentre, float radius) {
+    return !receiver.bothSides && dot(toCentre, receiver.normal) <= -radius * 1.001f;
 }
 
 float cosineAt(const Receiver& receiver, const Vec3& direction) {
@@ -25,8 +24,8 @@ float cosineAt(const Receiver& receiver, const Vec3& direction) {
 }  // namespace
 
 /// Estimated irradiance, unoccluded: 0 only where the light cannot contribute.
-float LightSampler::importance(const Receiver& receiver, const Light& light) const {
-    const float strength = maxComponent(light.intensity);
+float LightSampler::importance(const Receiver& receiver, const Candidate& light) {
+    const float strength = light.strength;
     const Vec3 to = light.position - receiver.position;
     const float d2 = lengthSquared(to);
     switch (light.type) {
@@ -34,14 +33,17 @@ float LightSampler::importance(const Receiver& receiver, const Light& light) con
         case LightType::Spot: {
             if (d2 == 0) return 0;
             const Vec3 direction = to / std::sqrt(d2);
-            return strength * light.cone(-direction) * cosineAt(receiver, direction) / d2;
+            const float cone =
+                std::clamp(light.coneOffset - dot(direction, light.direction) * light.coneScale, 0.f, 1.f);
+            return strength * cone * cone * cosineAt(receiver, direction) / d2;
         }
         case LightType::Directional:
             return strength * cosineAt(receiver, -light.direction);
         case LightType::Sphere:
-            return belowHorizon(receiver, light) ? 0 : strength / std::max(d2, square(light.radius));
+            return belowHorizon(receiver, to, light.radius) ? 0
+                                                            : strength / std::max(d2, square(light.radius));
         case LightType::Mesh:
-            return belowHorizon(receiver, light)
+            return belowHorizon(receiver, to, light.radius)
                        ? 0
                        : strength * std::min(light.area / std::max(d2, 0.25f * square(light.radius)), kPi);
         case LightType::Environment:
@@ -56,6 +58,9 @@ LightSampler::LightSampler(const Scene& scene) : scene_(&scene), lights_(scene.l
     std::vector<float> powers;
     for (const Light& light : lights_) {
         const float strength = maxComponent(light.intensity);
+        candidates_.push_back({light.position, light.radius, light.direction, strength, light.area,
+                               light.coneScale, light.coneOffset, light.type});
+        firstTriangle_.push_back(triangles_.size());
         switch (light.type) {
             case LightType::Point:
             case LightType::Spot:
@@ -64,6 +69,7 @@ LightSampler::LightSampler(const Scene& scene) : scene_(&scene), lights_(scene.l
                 break;
             case LightType::Mesh:
                 powers.push_back(strength * light.area * kPi);
+                addTriangles(light);
                 break;
             case LightType::Directional:
                 powers.push_back(strength * kPi * square(radius));
@@ -77,6 +83,19 @@ LightSampler::LightSampler(const Scene& scene) : scene_(&scene), lights_(scene.l
     byPower_ = Distribution(powers);
 }
 
+void LightSampler::addTriangles(const Light& light) {
+    const Shape& shape = scene_->shapes[light.shape];
+    for (std::uint32_t i = 0; i < shape.triangles; ++i) {
+        const auto& corner = scene_->triangles[shape.firstTriangle + i];
+        const Vec3& p = scene_->vertices[corner[0]].position;
+        const Vec3 e1 = scene_->vertices[corner[1]].position - p,
+                   e2 = scene_->vertices[corner[2]].position - p;
+        const Vec3 n = cross(e1, e2);
+        const float twiceArea = length(n);
+        triangles_.push_back({p, e1, e2, n / twiceArea, light.triangles.probability(i) * 2 / twiceArea});
+    }
+}
+
 LightSampler::Choice LightSampler::choose(const Receiver& receiver, float u) const {
     if (lights_.size() > kLocalLights) {
         const Distribution::Sample s = byPower_.sample(u);
@@ -86,7 +105,7 @@ LightSampler::Choice LightSampler::choose(const Receiver& receiver, float u) con
     float sum = 0;
     std::size_t possible = 0;
     for (std::size_t i = 0; i < lights_.size(); ++i) {
-        weights[i] = importance(receiver, lights_[i]);
+        weights[i] = importance(receiver, candidates_[i]);
         sum += weights[i];
         possible += weights[i] > 0;
     }
@@ -105,37 +124,35 @@ LightSampler::Choice LightSampler::choose(const Receiver& receiver, float u) con
 
 float LightSampler::probability(const Receiver& receiver, std::size_t light) const {
     if (lights_.size() > kLocalLights) return byPower_.probability(light);
-    const float own = importance(receiver, lights_[light]);
+    const float own = importance(receiver, candidates_[light]);
     if (own == 0) return 0;
     float sum = 0;
     int possible = 0;
-    for (const Light& l : lights_) {
-        const float w = importance(receiver, l);
+    for (const Candidate& candidate : candidates_) {
+        const float w = importance(receiver, candidate);
         sum += w;
         possible += w > 0;
     }
     return kEvenPart / static_cast<float>(possible) + (1 - kEvenPart) * own / sum;
 }
 
-LightSample LightSampler::sampleMesh(const Receiver& receiver, const Light& light, Vec2 u) const {
+LightSample LightSampler::sampleMesh(const Receiver& receiver, std::size_t index, Vec2 u) const {
     // u.x chooses the triangle, and its remainder the place on it.
+    const Light& light = lights_[index];
     const Distribution::Sample chosen = light.triangles.sample(u.x);
     const Vec2 b = uniformTriangle({chosen.remapped, u.y});
-    const Shape& shape = scene_->shapes[light.shape];
-    const auto triangle = shape.firstTriangle + static_cast<std::uint32_t>(chosen.index);
-    const auto& corner = scene_->triangles[triangle];
-    const Vec3& p0 = scene_->vertices[corner[0]].position;
-    const Vec3 e1 = scene_->vertices[corner[1]].position - p0, e2 = scene_->vertices[corner[2]].position - p0;
-    const Vec3 to = p0 + e1 * b.x + e2 * b.y - receiver.position;
+    const EmitterTriangle& t = triangles_[firstTriangle_[index] + chosen.index];
+    const Vec3 to = t.corner + t.edge1 * b.x + t.edge2 * b.y - receiver.position;
     const float d2 = lengthSquared(to);
     if (!(d2 > 0)) return {};
     LightSample s;
     s.distance = std::sqrt(d2);
     s.direction = to / s.distance;
-    const float cosLight = -dot(normalized(cross(e1, e2)), s.direction);
-    const Material& material = scene_->materials[shape.material];
-    if (cosLight == 0 || (cosLight < 0 && !material.visibleFromBehind())) return {};
-    s.pdf = light.density[chosen.index] * d2 / std::abs(cosLight);
+    const float cosLight = -dot(t.normal, s.direction);
+    const Shape& shape = scene_->shapes[light.shape];
+    if (cosLight == 0 || (cosLight < 0 && !scene_->materials[shape.material].visibleFromBehind())) return {};
+    s.pdf = t.density * d2 / std::abs(cosLight);
+    const auto triangle = shape.firstTriangle + static_cast<std::uint32_t>(chosen.index);
     s.radiance = emittedRadiance(*scene_, shape, triangle, b.x, b.y, std::abs(cosLight)) *
                  opacityAt(*scene_, shape, triangle, b.x, b.y);
     s.distance *= kReach;
@@ -174,22 +191,24 @@ LightSample LightSampler::sample(const Receiver& receiver, float choice, Vec2 u)
             if (d2 == 0) return {};
             const float distance = std::sqrt(d2);
             const Vec3 direction = to / distance;
-            return {direction, distance * kReach, light.intensity * (light.cone(-direction) / d2),
-                    chosen.probability, true};
+            return {direction, distance * kReach,
+                    light.intensity * (light.cone(-direction) * light.window(d2) / d2), chosen.probability,
+                    true};
         }
         case LightType::Directional:
-            return {-light.direction, std::numeric_limits<float>::infinity(), light.intensity, chosen.probability,
-                    true};
+            return {-light.direction, std::numeric_limits<float>::infinity(), light.intensity,
+                    chosen.probability, true};
         case LightType::Sphere:
             s = sampleSphere(receiver, light, u);
             break;
         case LightType::Mesh:
-            s = sampleMesh(receiver, light, u);
+            s = sampleMesh(receiver, chosen.light, u);
             break;
         case LightType::Environment: {
             const Environment& env = scene_->environment;
             const Environment::Sample e = env.sample(receiver.normal, receiver.bothSides, u);
-            s = {e.direction, std::numeric_limits<float>::infinity(), env.radiance(e.direction), e.pdf, false};
+            s = {e.direction, std::numeric_limits<float>::infinity(), env.radiance(e.direction), e.pdf,
+                 false};
             break;
         }
     }
@@ -199,8 +218,8 @@ LightSample LightSampler::sample(const Receiver& receiver, float choice, Vec2 u)
 
 float LightSampler::meshPdf(const Receiver& receiver, std::uint32_t light, std::uint32_t triangle,
                             float distance, float cosLight) const {
-    return probability(receiver, light) * lights_[light].density[triangle] * square(distance) /
-           std::max(std::abs(cosLight), 1e-12f);
+    return probability(receiver, light) * triangles_[firstTriangle_[light] + triangle].density *
+           square(distance) / std::max(std::abs(cosLight), 1e-12f);
 }
 
 float LightSampler::spherePdf(const Receiver& receiver, std::uint32_t light) const {

@@ -19,27 +19,29 @@ struct Light {
     std::string name;
     /// Point, Spot, Sphere: W/sr. Directional: W/m2 across the beam. Mesh: mean radiance.
     Rgb intensity;
-    Vec3 position;   ///< also the centre of a mesh light's bounds
-    Vec3 direction;  ///< unit, in which light travels (Spot, Directional, a spot's sphere)
+    Vec3 position;     ///< also the centre of a mesh light's bounds
+    Vec3 direction;    ///< unit, in which light travels (Spot, Directional, a spot's sphere)
     float radius = 0;  ///< of a sphere; of a mesh light's bounds
     /// KHR_lights_punctual's cone: factor clamp(cos x scale + offset, 0, 1)^2; 0 and 1 for all around.
     float coneScale = 0;
     float coneOffset = 1;
+    float range = 0;  ///< of Point and Spot; 0: without end
 
     // Mesh lights:
     std::uint32_t shape = 0;
     float area = 0;
-    Distribution triangles;        ///< chosen by power
-    std::vector<float> density;    ///< per triangle: probability / area
+    Distribution triangles;  ///< chosen by power
 
     /// Factor of the cone towards a unit vector that leaves the light.
     float cone(const Vec3& away) const {
         return square(std::clamp(dot(away, direction) * coneScale + coneOffset, 0.f, 1.f));
     }
-    /// Radiance of a sphere light's surface towards `away`: intensity spread over its disk.
-    Rgb sphereRadiance(const Vec3& away) const {
-        return intensity * (cone(away) / (kPi * radius * radius));
+    /// KHR_lights_punctual's window (Point, Spot): 1 - (distance / range)^4, 0 beyond the range.
+    float window(float distanceSquared) const {
+        return range > 0 ? std::max(0.f, 1 - square(distanceSquared / (range * range))) : 1.f;
     }
+    /// Radiance of a sphere light's surface towards `away`: intensity spread over its disk.
+    Rgb sphereRadiance(const Vec3& away) const { return intensity * (cone(away) / (kPi * radius * radius)); }
 };
 
 /// Radiance from far away: nothing, a constant, or a latitude-longitude image (rows from +y down; its middle
@@ -87,9 +89,9 @@ struct Receiver {
 /// Direct light towards a receiver: a direction, what arrives along it unoccluded, and how likely it was.
 struct LightSample {
     Vec3 direction;
-    float distance = 0;    ///< of the shadow ray
-    Rgb radiance;          ///< for delta lights: irradiance across the beam
-    float pdf = 0;         ///< per solid angle, choice of light included; for delta lights the latter only
+    float distance = 0;  ///< of the shadow ray
+    Rgb radiance;        ///< for delta lights: irradiance across the beam
+    float pdf = 0;       ///< per solid angle, choice of light included; for delta lights the latter only
     bool delta = false;
 };
 
@@ -112,19 +114,40 @@ class LightSampler {
     float environmentPdf(const Receiver& receiver, const Vec3& direction) const;
 
   private:
+    /// What choosing among the lights takes, close together in memory.
+    struct Candidate {
+        Vec3 position;
+        float radius = 0;
+        Vec3 direction;
+        float strength = 0;  ///< greatest channel
+        float area = 0;
+        float coneScale = 0;
+        float coneOffset = 1;
+        LightType type = LightType::Point;
+    };
+    /// A triangle of a mesh light.
+    struct EmitterTriangle {
+        Vec3 corner, edge1, edge2;
+        Vec3 normal;
+        float density = 0;  ///< probability / area
+    };
     struct Choice {
         std::size_t light = 0;
         float probability = 0;
     };
+    void addTriangles(const Light& light);
     Choice choose(const Receiver& receiver, float u) const;
     float probability(const Receiver& receiver, std::size_t light) const;
-    float importance(const Receiver& receiver, const Light& light) const;
+    static float importance(const Receiver& receiver, const Candidate& light);
 
-    LightSample sampleMesh(const Receiver& receiver, const Light& light, Vec2 u) const;
+    LightSample sampleMesh(const Receiver& receiver, std::size_t light, Vec2 u) const;
     LightSample sampleSphere(const Receiver& receiver, const Light& light, Vec2 u) const;
 
     const Scene* scene_;
     const std::vector<Light>& lights_;
+    std::vector<Candidate> candidates_;
+    std::vector<EmitterTriangle> triangles_;
+    std::vector<std::size_t> firstTriangle_;  ///< of each light, in triangles_
     Distribution byPower_;
     std::int64_t environmentLight_ = -1;
 };

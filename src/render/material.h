@@ -19,7 +19,7 @@ struct Material {
     float opacity = 1;             ///< baseColorFactor's alpha
     TextureRef baseColourTexture;  ///< rgb: colour, a: opacity
     float metallic = 1;
-    float roughness = 1;  ///< perceptual; GGX alpha is its square
+    float roughness = 1;                  ///< perceptual; GGX alpha is its square
     TextureRef metallicRoughnessTexture;  ///< g: roughness, b: metallic
     Rgb emission{0, 0, 0};                ///< radiance: emissiveFactor x emissiveStrength
     TextureRef emissionTexture;
@@ -45,6 +45,9 @@ struct Material {
     int albedoTable = 0;  ///< index into the scene's tables
     /// Index into the scene's glass tables, -1 when not rough transmissive.
     int glassTable = -1;
+
+    /// Whether anything is to be looked up at a point; set by completeScene.
+    bool textured = false;
 
     bool emissive() const { return !isBlack(emission); }
     bool transmissive() const { return transmission > 0 && metallic < 1; }

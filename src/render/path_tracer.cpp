@@ -19,8 +19,8 @@ Ray leave(const SurfacePoint& point, const Vec3& direction) {
     return {point.position + point.geometricNormal * side, direction};
 }
 
-/// Whether a direction is on the same side of the true and of the shading surface: light that only one of them
-/// lets through an opaque surface is a leak. Through glass it goes on, on the side where it truly is.
+/// Whether a direction is on the same side of the true and of the shading surface: light that only one of
+/// them lets through an opaque surface is a leak. Through glass it goes on, on the side where it truly is.
 bool consistent(const SurfacePoint& point, const Vec3& direction, float localZ) {
     return point.material->transmissive() || dot(point.geometricNormal, direction) * localZ > 0;
 }
@@ -48,9 +48,10 @@ Rgb PathTracer::directLight(const SurfacePoint& point, const Frame& frame, const
 PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
     PathSample result;
     Rgb throughput{1, 1, 1};
-    bool lightsSampled = false;   // at the previous vertex, so that what a ray meets by chance shares its weight
-    float bsdfPdf = 0;            // of the ray
-    Receiver receiver;            // the previous vertex
+    bool lightsSampled =
+        false;          // at the previous vertex, so that what a ray meets by chance shares its weight
+    float bsdfPdf = 0;  // of the ray
+    Receiver receiver;  // the previous vertex
     bool featuresPending = true;
     const std::uint32_t seed = sampler.hashSeed(dimension::kOpacity);
 
@@ -91,10 +92,11 @@ PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
         const bool emits = material.emissive() && (!point.fromBehind || material.visibleFromBehind());
         if (emits) {
             const float cosLight = std::abs(dot(point.geometricNormal, ray.direction));
-            const Rgb emitted = emittedRadiance(scene_, *point.shape, point.triangle, hit->u, hit->v, cosLight);
+            const Rgb emitted =
+                emittedRadiance(scene_, *point.shape, point.triangle, hit->u, hit->v, cosLight);
             const float w = chanceWeight([&] {
-                return lights_.meshPdf(receiver, static_cast<std::uint32_t>(point.shape->light), hit->triangle,
-                                       hit->distance, cosLight);
+                return lights_.meshPdf(receiver, static_cast<std::uint32_t>(point.shape->light),
+                                       hit->triangle, hit->distance, cosLight);
             });
             result.radiance += throughput * emitted * w;
         }
@@ -102,7 +104,8 @@ PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
         const SurfaceParameters surface = surfaceParameters(scene_, point);
         const Frame frame(point.shadingNormal);
         const Vec3 wo = frame.toLocal(-ray.direction);
-        const Bsdf bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, point.fromBehind, scene_.albedoTables[0]);
+        const Bsdf bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, point.fromBehind,
+                        scene_.albedoTables[0]);
         if (featuresPending && (bsdf.hasSmoothLobe() || emits)) {
             featuresPending = false;
             result.normal = point.shadingNormal;
@@ -115,8 +118,7 @@ PathSample PathTracer::trace(Ray ray, const PathSampler& sampler) const {
         if (lightsSampled) {
             const Vec2 u = sampler.pair(dimension::atBounce(bounce, dimension::kLight));
             const float choice = sampler.pair(dimension::atBounce(bounce, dimension::kLightChoice)).x;
-            result.radiance +=
-                throughput * directLight(point, frame, bsdf, receiver, choice, u, raySeed + 1);
+            result.radiance += throughput * directLight(point, frame, bsdf, receiver, choice, u, raySeed + 1);
         }
 
         const Vec2 choice = sampler.pair(dimension::atBounce(bounce, dimension::kChoice));

@@ -17,17 +17,18 @@ struct PathOptions {
 
 /// What one camera sample yields.
 struct PathSample {
-    Rgb radiance;         ///< never clamped
-    float depth = 0;      ///< along the camera ray to the first hit; 0 on a miss
-    bool hit = false;     ///< the camera ray met something
-    Rgb albedo{1, 1, 1};  ///< reflectance at the first hit that is not perfectly smooth; 1 for emitters, misses
-    Vec3 normal;          ///< shading normal there, towards the viewer; 0 on a miss
+    Rgb radiance;      ///< never clamped
+    float depth = 0;   ///< along the camera ray to the first hit; 0 on a miss
+    bool hit = false;  ///< the camera ray met something
+    Rgb albedo{1, 1,
+               1};  ///< reflectance at the first hit that is not perfectly smooth; 1 for emitters, misses
+    Vec3 normal;    ///< shading normal there, towards the viewer; 0 on a miss
 };
 
-/// Unidirectional path tracing with next-event estimation, multiple importance sampling by the power heuristic
-/// (Veach, "Robust Monte Carlo methods for light transport simulation", 1997) and Russian roulette by
-/// throughput. Unbiased up to `maxBounces`. Refers to scene and accelerator, which must outlive it; safe to
-/// use from many threads.
+/// Unidirectional path tracing with next-event estimation, multiple importance sampling by the power
+/// heuristic (Veach, "Robust Monte Carlo methods for light transport simulation", 1997) and Russian roulette
+/// by throughput. Unbiased up to `maxBounces`. Refers to scene and accelerator, which must outlive it; safe
+/// to use from many threads.
 class PathTracer {
   public:
     PathTracer(const Scene& scene, const Accelerator& accelerator, const PathOptions& options);

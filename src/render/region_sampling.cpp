@@ -80,7 +80,9 @@ class RegionRefiner {
             if (!cell.known.empty())
                 for (double& m : mean) m /= static_cast<double>(cell.known.size());
             Moments residuals;
-            const auto take = [&](const Rgb& v) { residuals.add({v.x - mean[0], v.y - mean[1], v.z - mean[2]}); };
+            const auto take = [&](const Rgb& v) {
+                residuals.add({v.x - mean[0], v.y - mean[1], v.z - mean[2]});
+            };
             for (const Rgb& v : cell.known) take(v);
             std::array<std::vector<Rgb>, 4> children;
             if (level > 0) distributeKnown(level, cell, children);
@@ -99,7 +101,8 @@ class RegionRefiner {
         return ((p.x >> (31 - level)) & 1u) + 2 * ((p.y >> (31 - level)) & 1u);
     }
 
-    /// The cell's first n points again, by the quadrants they lie in. Those outside the window were not taken.
+    /// The cell's first n points again, by the quadrants they lie in. Those outside the window were not
+    /// taken.
     void distributeKnown(int level, const Cell& cell, std::array<std::vector<Rgb>, 4>& children) const {
         std::size_t k = 0;
         for (std::uint32_t rank = 0; rank < kBranch; ++rank) {
@@ -192,7 +195,8 @@ void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_
 }
 
 std::vector<int> sampleHierarchically(const Window& window, int regionX, int regionY,
-                                      const HierarchicalOptions& options, std::uint64_t seed, const Shade& shade) {
+                                      const HierarchicalOptions& options, std::uint64_t seed,
+                                      const Shade& shade) {
     assert(options.levels >= 1 && options.levels <= 8);
     return RegionRefiner(window, regionX, regionY, options, seed, shade).run();
 }

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cassert>
 #include <chrono>
+#include <limits>
 
 #include "effects.h"
 #include "variolux/base/parallel.h"
@@ -63,7 +64,8 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
 
 class BandTracer {
   public:
-    BandTracer(const PathTracer& tracer, const View& view, const RenderOptions& options, const DumpHeader& header)
+    BandTracer(const PathTracer& tracer, const View& view, const RenderOptions& options,
+               const DumpHeader& header)
         : tracer_(tracer), view_(view), options_(options), header_(header) {}
 
     /// Traces the rows of `rows` (the data window's columns).
@@ -138,13 +140,17 @@ class BandTracer {
         parallelFor(0, static_cast<std::int64_t>(regions_.size()), [&](std::int64_t i) {
             const RegionResult& region = regions_[static_cast<std::size_t>(i)];
             std::array<std::uint64_t, kRegionSize * kRegionSize> next{};
-            forPixels(region, [&](std::size_t local, std::size_t pixel) { next[local] = band.offsets[pixel]; });
+            forPixels(region,
+                      [&](std::size_t local, std::size_t pixel) { next[local] = band.offsets[pixel]; });
             for (const Record& r : region.records) {
                 const PathSample& s = r.sample;
-                const std::array<float, 14> values = {
-                    s.radiance.x, s.radiance.y, s.radiance.z, s.hit ? 1.f : 0.f, s.depth,
-                    r.x,          r.y,          s.albedo.x,   s.albedo.y,        s.albedo.z,
-                    s.normal.x,   s.normal.y,   s.normal.z,   static_cast<float>(r.replicate)};
+                const std::array<float, 14> values = {s.radiance.x, s.radiance.y,
+                                                      s.radiance.z, s.hit ? 1.f : 0.f,
+                                                      s.depth,      r.x,
+                                                      r.y,          s.albedo.x,
+                                                      s.albedo.y,   s.albedo.z,
+                                                      s.normal.x,   s.normal.y,
+                                                      s.normal.z,   static_cast<float>(r.replicate)};
                 const std::uint64_t at = next[static_cast<std::size_t>(r.pixel)]++;
                 for (std::size_t c = 0; c < band.values.size(); ++c) band.values[c][at] = values[c];
             }
@@ -168,13 +174,18 @@ std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
     if (crop) {
         const bool inside = crop->width >= 1 && crop->height >= 1 && crop->x >= 0 && crop->y >= 0 &&
                             crop->x <= width - crop->width && crop->y <= height - crop->height;
-        if (!inside) return "the crop must lie inside the picture of " + std::to_string(width) + "x" + std::to_string(height);
+        if (!inside)
+            return "the crop must lie inside the picture of " + std::to_string(width) + "x" +
+                   std::to_string(height);
     }
     if (camera >= scene.cameras.size())
-        return "camera " + std::to_string(camera) + " does not exist, the scene has " + std::to_string(scene.cameras.size());
+        return "camera " + std::to_string(camera) + " does not exist, the scene has " +
+               std::to_string(scene.cameras.size());
     const Camera& c = scene.cameras[camera];
     if (!c.unusable.empty()) return "camera '" + c.name + "' cannot be used: " + c.unusable;
     if (spp < 1 || spp > 1 << 24) return "spp must be 1 to 2^24";
+    if (seed > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
+        return "seed must be less than 2^63";
     if (replicates < 1 || spp % replicates != 0) return "replicates must divide spp";
     if (hierarchical && replicates != 1) return "hierarchical sampling has one randomisation, not replicates";
     if (!(refinement.tolerance >= 0)) return "tolerance must be 0 or more";
@@ -196,7 +207,8 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     const std::int64_t mostSpp =
         options.hierarchical ? std::int64_t{1} << (2 * (options.refinement.levels - 1)) : options.spp;
     int bandRows = kBandRows;
-    while (bandRows > kRegionSize && bandRows * mostSpp * window.width > kBandSamples) bandRows -= kRegionSize;
+    while (bandRows > kRegionSize && bandRows * mostSpp * window.width > kBandSamples)
+        bandRows -= kRegionSize;
 
     const int regionsAcross = (window.x + window.width - 1) / kRegionSize - window.x / kRegionSize + 1;
     const int regionsDown = (window.y + window.height - 1) / kRegionSize - window.y / kRegionSize + 1;

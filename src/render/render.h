@@ -33,9 +33,9 @@ struct RenderOptions {
 
 struct RenderReport {
     std::uint64_t samples = 0;
-    std::uint64_t nonFinite = 0;    ///< samples whose radiance overflowed: written as 0, counted here
-    double traceSeconds = 0;        ///< wall time of tracing
-    double writeCpuSeconds = 0;     ///< processor time of compressing and writing
+    std::uint64_t nonFinite = 0;  ///< samples whose radiance overflowed: written as 0, counted here
+    double traceSeconds = 0;      ///< wall time of tracing
+    double writeCpuSeconds = 0;   ///< processor time of compressing and writing
     std::vector<std::uint64_t> refinedCells;  ///< hierarchical: cells refined at each level
 };
 

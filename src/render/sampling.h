@@ -18,10 +18,10 @@ inline constexpr std::uint32_t kOpacity = 2;  ///< seeds the hash of stochastic 
 inline constexpr std::uint32_t kFirstBounce = 3;
 inline constexpr std::uint32_t kPerBounce = 4;
 // Added to the bounce's first pair:
-inline constexpr std::uint32_t kDirection = 0;   ///< direction within the sampled lobe
-inline constexpr std::uint32_t kChoice = 1;      ///< x: lobe, y: Russian roulette
-inline constexpr std::uint32_t kLight = 2;       ///< point on the light
-inline constexpr std::uint32_t kLightChoice = 3; ///< x: which light
+inline constexpr std::uint32_t kDirection = 0;    ///< direction within the sampled lobe
+inline constexpr std::uint32_t kChoice = 1;       ///< x: lobe, y: Russian roulette
+inline constexpr std::uint32_t kLight = 2;        ///< point on the light
+inline constexpr std::uint32_t kLightChoice = 3;  ///< x: which light
 
 constexpr std::uint32_t atBounce(int bounce, std::uint32_t use) {
     return kFirstBounce + static_cast<std::uint32_t>(bounce) * kPerBounce + use;

@@ -55,8 +55,9 @@ Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& materi
     const float norm = length(tangent);
     if (!(norm > 1e-12f)) return normal;
     tangent = tangent / norm;
-    const Rgb encoded =
-        scene.textures[static_cast<std::size_t>(material.normalTexture.texture)].lookup(uv.of(material.normalTexture)).rgb;
+    const Rgb encoded = scene.textures[static_cast<std::size_t>(material.normalTexture.texture)]
+                            .lookup(uv.of(material.normalTexture))
+                            .rgb;
     const Vec3 local{(2 * encoded.x - 1) * material.normalScale, (2 * encoded.y - 1) * material.normalScale,
                      2 * encoded.z - 1};
     const Vec3 mapped = tangent * local.x + cross(normal, tangent) * (sign * local.y) + normal * local.z;
@@ -123,8 +124,7 @@ Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triang
                         .lookup(uv.of(material.emissionTexture))
                         .rgb;
     }
-    if (material.clearcoat > 0)
-        emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
+    if (material.clearcoat > 0) emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
     return emission;
 }
 
@@ -146,7 +146,7 @@ SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirect
     // Vertices without a normal, or with normals that cancel out: the triangle's own.
     const float norm = length(shading);
     shading = norm > 1e-6f ? shading / norm : normalized(geometric);
-    p.uv = textureCoordinates(scene, shape, p.triangle, hit.u, hit.v);
+    if (p.material->textured) p.uv = textureCoordinates(scene, shape, p.triangle, hit.u, hit.v);
     if (p.material->normalTexture)
         shading = mappedNormal(scene, shape, *p.material, corner, hit.u, hit.v, p.uv, shading);
     if (shape.firstColour >= 0) p.colour = colourAt(scene, shape, corner, hit.u, hit.v).rgb;
@@ -172,27 +172,29 @@ SurfaceParameters surfaceParameters(const Scene& scene, const SurfacePoint& poin
     };
     SurfaceParameters s;
     s.baseColour = m.baseColour * point.colour;
-    if (m.baseColourTexture) s.baseColour *= sampled(m.baseColourTexture).rgb;
     s.metallic = m.metallic;
     s.roughness = m.roughness;
+    s.transmission = m.transmission;
+    s.ior = m.ior;
+    s.specular = m.specular;
+    s.specularColour = m.specularColour;
+    s.clearcoat = m.clearcoat;
+    s.clearcoatRoughness = m.clearcoatRoughness;
+    s.albedoTable = &scene.albedoTables[static_cast<std::size_t>(m.albedoTable)];
+    if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
+    if (!m.textured) return s;
+
+    if (m.baseColourTexture) s.baseColour *= sampled(m.baseColourTexture).rgb;
     if (m.metallicRoughnessTexture) {
         const Rgb t = sampled(m.metallicRoughnessTexture).rgb;
         s.roughness *= t.y;
         s.metallic *= t.z;
     }
-    s.ior = m.ior;
-    s.specular = m.specular;
-    if (m.specularTexture) s.specular *= sampled(m.specularTexture).a;
-    s.specularColour = m.specularColour;
-    if (m.specularColourTexture) s.specularColour *= sampled(m.specularColourTexture).rgb;
-    s.transmission = m.transmission;
     if (m.transmissionTexture) s.transmission *= sampled(m.transmissionTexture).rgb.x;
-    s.clearcoat = m.clearcoat;
+    if (m.specularTexture) s.specular *= sampled(m.specularTexture).a;
+    if (m.specularColourTexture) s.specularColour *= sampled(m.specularColourTexture).rgb;
     if (m.clearcoatTexture) s.clearcoat *= sampled(m.clearcoatTexture).rgb.x;
-    s.clearcoatRoughness = m.clearcoatRoughness;
     if (m.clearcoatRoughnessTexture) s.clearcoatRoughness *= sampled(m.clearcoatRoughnessTexture).rgb.y;
-    s.albedoTable = &scene.albedoTables[static_cast<std::size_t>(m.albedoTable)];
-    if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
     return s;
 }
 

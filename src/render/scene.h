@@ -37,8 +37,8 @@ struct Shape {
     std::uint32_t firstVertex = 0;
     std::uint32_t vertices = 0;
     std::uint32_t material = 0;
-    std::int32_t light = -1;            ///< index of its mesh light, or -1
-    std::int64_t firstTangent = -1;     ///< of the optional arrays: -1 when it has none
+    std::int32_t light = -1;         ///< index of its mesh light, or -1
+    std::int64_t firstTangent = -1;  ///< of the optional arrays: -1 when it has none
     std::int64_t firstSecondUv = -1;
     std::int64_t firstColour = -1;
 };
@@ -69,8 +69,8 @@ struct Scene {
     std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into vertices; front counter-clockwise
     std::vector<Tangent> tangents;
     std::vector<Vec2> secondUvs;
-    std::vector<Rgba> colours;  ///< linear factors of the base colour
-    std::vector<Shape> shapes;  ///< groups' shapes come last
+    std::vector<Rgba> colours;      ///< linear factors of the base colour
+    std::vector<Shape> shapes;      ///< groups' shapes come last
     std::uint32_t worldShapes = 0;  ///< number of shapes that are in no group
     std::vector<Group> groups;
     std::vector<Instance> instances;

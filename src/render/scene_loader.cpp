@@ -73,7 +73,8 @@ class Loader {
         completeScene(scene_);
         if (scene_.lights.empty())
             file_.fail(
-                "has no light: neither punctual lights nor emissive surfaces nor an environment (give one with "
+                "has no light: neither punctual lights nor emissive surfaces nor an environment (give one "
+                "with "
                 "--env-constant or --env)");
         return std::move(scene_);
     }
@@ -88,11 +89,12 @@ class Loader {
 
     void checkExtensions() {
         static const std::set<std::string> known = {
-            "KHR_lights_punctual",      "KHR_texture_transform",  "KHR_mesh_quantization",
-            "KHR_materials_ior",        "KHR_materials_specular", "KHR_materials_emissive_strength",
+            "KHR_lights_punctual",     "KHR_texture_transform",     "KHR_mesh_quantization",
+            "KHR_materials_ior",       "KHR_materials_specular",    "KHR_materials_emissive_strength",
             "KHR_materials_clearcoat", "KHR_materials_transmission"};
         for (const std::string& name : model_.extensionsRequired)
-            if (!known.contains(name)) file_.fail("requires the extension " + name + ", which is not supported");
+            if (!known.contains(name))
+                file_.fail("requires the extension " + name + ", which is not supported");
         for (const std::string& name : model_.extensionsUsed)
             if (!known.contains(name)) warn("the extension " + name + " is ignored");
         if (!model_.animations.empty()) warn("animations are left at rest");
@@ -133,10 +135,13 @@ class Loader {
                            std::to_string(model_.nodes.size()));
             const auto index = static_cast<std::size_t>(next.node);
             const tinygltf::Node& node = model_.nodes[index];
-            if (visited[index]++) file_.fail(described("node", index, node.name) + " has more than one parent");
-            const Transform toWorld = next.parent * localTransform(file_, node, described("node", index, node.name));
+            if (visited[index]++)
+                file_.fail(described("node", index, node.name) + " has more than one parent");
+            const Transform toWorld =
+                next.parent * localTransform(file_, node, described("node", index, node.name));
             placed.push_back({index, toWorld});
-            for (auto c = node.children.rbegin(); c != node.children.rend(); ++c) stack.push_back({*c, toWorld});
+            for (auto c = node.children.rbegin(); c != node.children.rend(); ++c)
+                stack.push_back({*c, toWorld});
         }
         return placed;
     }
@@ -210,9 +215,11 @@ class Loader {
         }
         camera.verticalFov = static_cast<float>(source.perspective.yfov);
         camera.aspect = static_cast<float>(source.perspective.aspectRatio);
-        if (source.type != "perspective") camera.unusable = "it is not a perspective camera";
+        if (source.type != "perspective")
+            camera.unusable = "it is not a perspective camera";
         else if (!(camera.verticalFov > 0 && camera.verticalFov < kPi))
-            camera.unusable = "its yfov is " + std::to_string(camera.verticalFov) + ", expected between 0 and pi";
+            camera.unusable =
+                "its yfov is " + std::to_string(camera.verticalFov) + ", expected between 0 and pi";
         if (!(camera.aspect > 0 && camera.aspect < 1e6f)) camera.aspect = 0;
         const auto extra = [&](const char* key) {
             return number(node.extras, key, number(source.extras, key, 0));
@@ -240,7 +247,8 @@ class Loader {
             colour = {static_cast<float>(source.color[0]), static_cast<float>(source.color[1]),
                       static_cast<float>(source.color[2])};
         light.intensity = colour * static_cast<float>(source.intensity);
-        if (!isFinite(light.intensity) || light.intensity.x < 0 || light.intensity.y < 0 || light.intensity.z < 0)
+        if (!isFinite(light.intensity) || light.intensity.x < 0 || light.intensity.y < 0 ||
+            light.intensity.z < 0)
             file_.fail(what + ": the light's intensity must be finite and >= 0");
         if (isBlack(light.intensity)) {
             warn(what + ": the light has no power");
@@ -252,12 +260,11 @@ class Loader {
         if (directed && !(length(axis) > 0)) file_.fail(what + ": the light has no direction");
         light.direction = directed ? normalized(axis) : Vec3{0, 0, -1};
         const double radius = number(node.extras, "radius", number(source.extras, "radius", 0));
+        if (source.range > 0) light.range = static_cast<float>(source.range);
         if (source.type == "directional") {
             light.type = LightType::Directional;
         } else if (source.type == "point" || source.type == "spot") {
-            light.type = radius > 0   ? LightType::Sphere
-                         : directed ? LightType::Spot
-                                    : LightType::Point;
+            light.type = radius > 0 ? LightType::Sphere : directed ? LightType::Spot : LightType::Point;
             light.radius = static_cast<float>(std::max(0.0, radius));
             if (directed) {
                 const double inner = std::cos(source.spot.innerConeAngle);
@@ -267,7 +274,8 @@ class Loader {
                 light.coneOffset = static_cast<float>(-outer * scale);
             }
         } else {
-            file_.fail(what + ": the light's type is '" + source.type + "', expected point, spot or directional");
+            file_.fail(what + ": the light's type is '" + source.type +
+                       "', expected point, spot or directional");
         }
         scene_.lights.push_back(std::move(light));
     }
@@ -279,8 +287,8 @@ class Loader {
             scene_.environment = loadEnvironment(options.image);
         } else if (sceneExtras_.IsObject() && sceneExtras_.Has("env_constant")) {
             const tinygltf::Value& v = sceneExtras_.Get("env_constant");
-            const bool triple = v.IsArray() && v.ArrayLen() == 3 && v.Get(0).IsNumber() && v.Get(1).IsNumber() &&
-                                v.Get(2).IsNumber();
+            const bool triple = v.IsArray() && v.ArrayLen() == 3 && v.Get(0).IsNumber() &&
+                                v.Get(1).IsNumber() && v.Get(2).IsNumber();
             if (!triple) file_.fail("the scene's env_constant must be three numbers");
             const auto at = [&](int i) { return static_cast<float>(v.Get(i).GetNumberAsDouble()); };
             const Rgb radiance{at(0), at(1), at(2)};

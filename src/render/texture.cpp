@@ -20,19 +20,15 @@ ByteTable byteTable(bool srgb) {
 const ByteTable kSrgbBytes = byteTable(true);
 const ByteTable kLinearBytes = byteTable(false);
 
+/// Texel index of `i` in [-1, 2 size]: lookups begin in the first two periods.
 int wrapped(int i, int size, Wrap mode) {
-    switch (mode) {
-        case Wrap::Clamp:
-            return std::clamp(i, 0, size - 1);
-        case Wrap::Mirror: {
-            const int period = ((i % (2 * size)) + 2 * size) % (2 * size);
-            return period < size ? period : 2 * size - 1 - period;
-        }
-        case Wrap::Repeat:
-            break;
+    if (mode == Wrap::Clamp) return std::clamp(i, 0, size - 1);
+    if (mode == Wrap::Mirror) {
+        const int folded = i < 0 ? -1 - i : i < 2 * size ? i : i - 2 * size;
+        return folded < size ? folded : 2 * size - 1 - folded;
     }
-    const int r = i % size;
-    return r < 0 ? r + size : r;
+    const int up = i < 0 ? i + size : i;
+    return up < size ? up : up - size < size ? up - size : up - 2 * size;
 }
 
 Rgba operator+(const Rgba& p, const Rgba& q) { return {p.rgb + q.rgb, p.a + q.a}; }
@@ -58,8 +54,8 @@ Texture::Texture(int width, int height, std::vector<float> rgba, ColourSpace spa
 }
 
 Rgba Texture::texel(int x, int y) const {
-    const std::size_t i = 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                               static_cast<std::size_t>(x));
+    const std::size_t i =
+        4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x));
     if (!floats_.empty()) return {{floats_[i], floats_[i + 1], floats_[i + 2]}, floats_[i + 3]};
     const ByteTable& table = space_ == ColourSpace::Srgb ? kSrgbBytes : kLinearBytes;
     return {{table[bytes_[i]], table[bytes_[i + 1]], table[bytes_[i + 2]]}, kLinearBytes[bytes_[i + 3]]};

@@ -14,8 +14,8 @@ double cofactor(const Transform& t, std::size_t row, std::size_t col) {
 Vec3 Transform::normal(const Vec3& n) const {
     const double sign = determinant() < 0 ? -1 : 1;
     const auto row = [&](std::size_t i) {
-        return static_cast<float>(sign * (cofactor(*this, i, 0) * n.x + cofactor(*this, i, 1) * n.y +
-                                  cofactor(*this, i, 2) * n.z));
+        return static_cast<float>(
+            sign * (cofactor(*this, i, 0) * n.x + cofactor(*this, i, 1) * n.y + cofactor(*this, i, 2) * n.z));
     };
     return {row(0), row(1), row(2)};
 }

@@ -47,9 +47,7 @@ inline Vec3 normalized(const Vec3& a) { return a * (1.f / length(a)); }
 inline Vec3 absolute(const Vec3& a) { return {std::abs(a.x), std::abs(a.y), std::abs(a.z)}; }
 constexpr float maxComponent(const Vec3& a) { return std::max(a.x, std::max(a.y, a.z)); }
 constexpr bool isBlack(const Rgb& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
-inline bool isFinite(const Vec3& a) {
-    return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
-}
+inline bool isFinite(const Vec3& a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 /// Relative luminance of Rec. 709 primaries.
 constexpr float luminance(const Rgb& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 constexpr float square(float v) { return v * v; }

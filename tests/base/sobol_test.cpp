@@ -23,7 +23,9 @@ std::vector<Sequence> sequences() {
     return all;
 }
 
-std::uint32_t leadingDigits(std::uint32_t value, int digits) { return digits == 0 ? 0 : value >> (32 - digits); }
+std::uint32_t leadingDigits(std::uint32_t value, int digits) {
+    return digits == 0 ? 0 : value >> (32 - digits);
+}
 
 TEST(Sobol, FirstPoints) {
     const std::uint32_t half = 1u << 31, quarter = 1u << 30;
@@ -51,8 +53,8 @@ TEST(Sobol, EveryRunOf2ToTheMHasOnePointInEveryElementaryIntervalOfThatArea) {
     }
 }
 
-/// METHOD.md, section 2, n = 4: the first 4n points of any cell have n in each of its quadrants. One branch of
-/// the tree, down to the last depth.
+/// METHOD.md, section 2, n = 4: the first 4n points of any cell have n in each of its quadrants. One branch
+/// of the tree, down to the last depth.
 TEST(Sobol, FirstSixteenPointsOfACellHaveFourInEachQuadrantAtEveryDepth) {
     for (int k = 0; k < 20; ++k) {
         const SobolSeeds seeds = seedsOf(k);

@@ -77,8 +77,10 @@ struct GltfText {
     }
 
     int indices(const std::vector<std::uint16_t>& values) {
-        json["accessors"].push_back(
-            {{"bufferView", view(values)}, {"componentType", 5123}, {"count", values.size()}, {"type", "SCALAR"}});
+        json["accessors"].push_back({{"bufferView", view(values)},
+                                     {"componentType", 5123},
+                                     {"count", values.size()},
+                                     {"type", "SCALAR"}});
         return static_cast<int>(json["accessors"].size()) - 1;
     }
 

@@ -41,7 +41,8 @@ TEST(ClosedBox, HasTheRadiosityOfAnInfiniteSeriesOfBounces) {
     const Scene scene = t.finish();
     PathOptions options;
     options.maxBounces = 200;
-    const Estimate e = estimate(scene, {{0.1f, 0.2f, 0.3f}, normalized({0.3f, -0.5f, 0.8f})}, kMany / 4, options);
+    const Estimate e =
+        estimate(scene, {{0.1f, 0.2f, 0.3f}, normalized({0.3f, -0.5f, 0.8f})}, kMany / 4, options);
     expectRadiance(e, emission / (Rgb(1) - rho));
     EXPECT_LT(e.error[0], 0.02);
 }
@@ -84,6 +85,20 @@ TEST(PointLight, CastsHardShadows) {
     expectRadiance(estimate(t.finish(), kDown, 100), {0, 0, 0});
 }
 
+TEST(PointLight, EndsAtItsRange) {
+    for (const float range : {10.f, 2.f}) {
+        TestScene t;
+        floorBelow(t);
+        Light light;
+        light.position = {0.2f, 3, 0.1f};
+        light.intensity = {3, 5, 7};
+        light.range = range;
+        t.light(light);
+        const float window = range > 3 ? 1 - std::pow(3 / range, 4.f) : 0;
+        expectRadiance(estimate(t.finish(), kDown, 100), lit(light.intensity * (window / 9)));
+    }
+}
+
 TEST(SpotLight, HasFullIntensityInsideNothingOutsideAndTheReferenceFalloffBetween) {
     for (const float x : {0.2f, 0.9f, 1.1f, 1.5f, 2.2f}) {
         TestScene t;
@@ -114,7 +129,8 @@ TEST(DirectionalLight, GivesItsIrradianceTimesTheCosine) {
     expectRadiance(estimate(t.finish(), kDown, 100), lit(light.intensity * -light.direction.y));
 }
 
-/// Irradiance of a sphere of intensity I at distance d wholly above the horizon: that of a point, I cos / d^2.
+/// Irradiance of a sphere of intensity I at distance d wholly above the horizon: that of a point, I cos /
+/// d^2.
 TEST(SphereLight, LightsLikeAPointOfTheSameIntensity) {
     for (const Strategy strategy : {Strategy::Mis, Strategy::LightsOnly, Strategy::BsdfOnly}) {
         TestScene t;
@@ -183,8 +199,9 @@ Environment patchyEnvironment() {
     std::vector<Rgb> pixels(w * h);
     for (int y = 0; y < h; ++y)
         for (int x = 0; x < w; ++x)
-            pixels[static_cast<std::size_t>(y * w + x)] =
-                (x > 20 && x < 25 && y > 5 && y < 9) ? Rgb{50, 40, 30} : Rgb(0.1f + 0.01f * static_cast<float>(y));
+            pixels[static_cast<std::size_t>(y * w + x)] = (x > 20 && x < 25 && y > 5 && y < 9)
+                                                              ? Rgb{50, 40, 30}
+                                                              : Rgb(0.1f + 0.01f * static_cast<float>(y));
     return {w, h, pixels};
 }
 
@@ -212,7 +229,8 @@ TEST(Environment, SamplesHaveTheDensityThatPdfSaysAndItIntegratesToOne) {
         const double theta = (i + 0.5) * std::numbers::pi / n;
         for (int j = 0; j < 2 * n; ++j) {
             const double phi = (j + 0.5) * std::numbers::pi / n;
-            const Vec3 d{static_cast<float>(std::sin(theta) * std::cos(phi)), static_cast<float>(std::cos(theta)),
+            const Vec3 d{static_cast<float>(std::sin(theta) * std::cos(phi)),
+                         static_cast<float>(std::cos(theta)),
                          static_cast<float>(std::sin(theta) * std::sin(phi))};
             const double solidAngle = std::sin(theta) * std::pow(std::numbers::pi / n, 2);
             integral += env.pdf(d, {0, 1, 0}, false) * solidAngle;
@@ -276,7 +294,8 @@ Scene mixedRoom(bool deltaLights) {
 TEST(Strategies, AgreeOnEveryKindOfSurface) {
     const Scene scene = mixedRoom(false);
     const Vec3 eye{0, 1.5f, 4};
-    for (const Vec3& target : {Vec3{-0.8f, 0.6f, 0.5f}, Vec3{0.8f, 0.6f, 0.5f}, Vec3{0.3f, 0, 1}, Vec3{-2, 0, -1}}) {
+    for (const Vec3& target :
+         {Vec3{-0.8f, 0.6f, 0.5f}, Vec3{0.8f, 0.6f, 0.5f}, Vec3{0.3f, 0, 1}, Vec3{-2, 0, -1}}) {
         std::vector<Estimate> results;
         for (const Strategy strategy : {Strategy::Mis, Strategy::LightsOnly, Strategy::BsdfOnly}) {
             PathOptions options;
@@ -346,7 +365,8 @@ TEST(Glass, ASlabShiftsButDoesNotBendAndLosesItsReflections) {
 TEST(Features, AreTakenAtTheFirstHitThatIsNotSmooth) {
     TestScene t;
     t.box(t.material(TestScene::glass(1.5f, 0)), {-5, -5, 0}, {5, 5, 0.2f});
-    t.quad(t.material(TestScene::matte({0.2f, 0.4f, 0.6f})), {-9, -9, -1}, {9, -9, -1}, {9, 9, -1}, {-9, 9, -1});
+    t.quad(t.material(TestScene::matte({0.2f, 0.4f, 0.6f})), {-9, -9, -1}, {9, -9, -1}, {9, 9, -1},
+           {-9, 9, -1});
     t.environment(Environment(Rgb(1)));
     const Scene scene = t.finish();
     const Accelerator accelerator(scene);

@@ -22,10 +22,10 @@ Scene room() {
     veil.opacity = 0.5f;
     t.quad(t.material(veil), {0.2f, 0.2f, 0.5f}, {1.4f, 0.2f, 0.5f}, {1.4f, 1.6f, 0.5f}, {0.2f, 1.6f, 0.5f});
     for (const Rgb& c : {Rgb{1, 0, 0}, Rgb{0, 0, 1}})
-        t.quad(t.material(TestScene::matte(c)), {-1.9f, 0.01f, 1.9f}, {1.9f, 0.01f, 1.9f}, {1.9f, 0.01f, -1.9f},
-               {-1.9f, 0.01f, -1.9f});
-    t.quad(t.material(TestScene::emitter(Rgb(8))), {-0.5f, 2.9f, -0.5f}, {0.5f, 2.9f, -0.5f}, {0.5f, 2.9f, 0.5f},
-           {-0.5f, 2.9f, 0.5f});
+        t.quad(t.material(TestScene::matte(c)), {-1.9f, 0.01f, 1.9f}, {1.9f, 0.01f, 1.9f},
+               {1.9f, 0.01f, -1.9f}, {-1.9f, 0.01f, -1.9f});
+    t.quad(t.material(TestScene::emitter(Rgb(8))), {-0.5f, 2.9f, -0.5f}, {0.5f, 2.9f, -0.5f},
+           {0.5f, 2.9f, 0.5f}, {-0.5f, 2.9f, 0.5f});
     t.camera({0, 1.2f, 1.9f}, {0, 1, 0}, 1.2f);
     t.scene().cameras[0].lensRadius = 0.05f;
     t.scene().cameras[0].focusDistance = 2;
@@ -96,7 +96,8 @@ TEST(RenderDump, ACropIsThatPartOfThePicture) {
     const SampleBand whole = samplesOf(folder / "whole.exr"), crop = samplesOf(folder / "crop.exr");
     for (int y = 0; y < 11; ++y) {
         for (int x = 0; x < 9; ++x) {
-            const auto p = static_cast<std::size_t>(y * 9 + x), q = static_cast<std::size_t>((y + 3) * 37 + x + 5);
+            const auto p = static_cast<std::size_t>(y * 9 + x),
+                       q = static_cast<std::size_t>((y + 3) * 37 + x + 5);
             ASSERT_EQ(crop.offsets[p + 1] - crop.offsets[p], 6u);
             for (std::size_t c = 0; c < crop.values.size(); ++c)
                 for (std::size_t s = 0; s < 6; ++s)
@@ -121,8 +122,8 @@ TEST(RenderDump, HeaderSaysWhatWasDone) {
     EXPECT_EQ(h.pixelFilter, "box");
     EXPECT_EQ(h.seed, 5);
     EXPECT_EQ(h.samples, 6);
-    EXPECT_EQ(h.effects, (std::vector<std::string>{"diffuse", "mirror", "transmission", "alpha", "emissive_meshes",
-                                                   "depth_of_field", "indirect"}));
+    EXPECT_EQ(h.effects, (std::vector<std::string>{"diffuse", "mirror", "transmission", "alpha",
+                                                   "emissive_meshes", "depth_of_field", "indirect"}));
     ASSERT_TRUE(h.worldToCamera && h.worldToNDC && h.renderSeconds);
     EXPECT_EQ(findChannel(h, "sample.replicate"), -1);
     EXPECT_EQ(h.channels.size(), 13u);

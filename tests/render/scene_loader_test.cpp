@@ -76,8 +76,9 @@ TEST(LoadScene, NodeTransformsMultiplyDownTheTree) {
     GltfText g;
     g.json["nodes"][0]["translation"] = {0, 0, -1};
     g.json["nodes"][0]["scale"] = {2, 1, 1};
-    g.json["nodes"].push_back(
-        {{"children", {0}}, {"rotation", {0, 0, std::sqrt(0.5), std::sqrt(0.5)}}, {"translation", {5, 0, 0}}});
+    g.json["nodes"].push_back({{"children", {0}},
+                               {"rotation", {0, 0, std::sqrt(0.5), std::sqrt(0.5)}},
+                               {"translation", {5, 0, 0}}});
     g.json["scenes"][0]["nodes"] = {3, 1, 2};
     const Scene s = load(g);
     // x doubled, then turned a quarter about z, then moved.
@@ -203,8 +204,8 @@ TEST(Texture, BilinearBetweenTexelCentresAndRepeating) {
     t.wrapU = Wrap::Mirror;
     EXPECT_FLOAT_EQ(t.lookup({0, 0.25f}).rgb.x, 0);
     EXPECT_FLOAT_EQ(t.lookup({1.25f, 0.25f}).rgb.x, 1);
-    for (const float wild : {1e30f, -1e30f, std::numeric_limits<float>::infinity(),
-                             std::numeric_limits<float>::quiet_NaN()})
+    for (const float wild :
+         {1e30f, -1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()})
         EXPECT_TRUE(std::isfinite(t.lookup({wild, wild}).rgb.x));
 }
 
@@ -242,17 +243,16 @@ TEST(LoadScene, VertexColoursMultiplyTheBaseColour) {
 
 TEST(LoadScene, QuantisedAndSparseAccessors) {
     GltfText g;
-    const int view = g.view(std::vector<std::int16_t>{-32767, -32767, 0, 0, 32767, -32767, 0, 0, 32767, 32767, 0, 0,
-                                                      -32767, 32767, 0, 0});
+    const int view = g.view(std::vector<std::int16_t>{-32767, -32767, 0, 0, 32767, -32767, 0, 0, 32767, 32767,
+                                                      0, 0, -32767, 32767, 0, 0});
     g.json["bufferViews"][static_cast<std::size_t>(view)]["byteStride"] = 8;
-    g.json["accessors"][0] = {{"bufferView", view}, {"componentType", 5122}, {"count", 4},
-                              {"type", "VEC3"},     {"normalized", true}};
+    g.json["accessors"][0] = {
+        {"bufferView", view}, {"componentType", 5122}, {"count", 4}, {"type", "VEC3"}, {"normalized", true}};
     const int where = g.view(std::vector<std::uint16_t>{2});
     const int with = g.view(std::vector<std::int16_t>{32767, 32767, 32767});
-    g.json["accessors"][0]["sparse"] = {
-        {"count", 1},
-        {"indices", {{"bufferView", where}, {"componentType", 5123}}},
-        {"values", {{"bufferView", with}}}};
+    g.json["accessors"][0]["sparse"] = {{"count", 1},
+                                        {"indices", {{"bufferView", where}, {"componentType", 5123}}},
+                                        {"values", {{"bufferView", with}}}};
     const Scene s = load(g);
     EXPECT_EQ(s.boundsMin, (Vec3{-1, -1, 0}));
     EXPECT_EQ(s.boundsMax, (Vec3{1, 1, 1}));
@@ -279,10 +279,11 @@ TEST(LoadScene, StripsAndFansAreTakenApart) {
 
 TEST(LoadScene, CamerasAndTheirExtras) {
     GltfText g;
-    g.json["cameras"].push_back({{"type", "perspective"},
-                                 {"perspective", {{"yfov", 1.0}, {"znear", 0.1}, {"aspectRatio", 1.5}}}});
-    g.json["cameras"].push_back({{"type", "orthographic"},
-                                 {"orthographic", {{"xmag", 1.0}, {"ymag", 1}, {"zfar", 9}, {"znear", 0.1}}}});
+    g.json["cameras"].push_back(
+        {{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.1}, {"aspectRatio", 1.5}}}});
+    g.json["cameras"].push_back(
+        {{"type", "orthographic"},
+         {"orthographic", {{"xmag", 1.0}, {"ymag", 1}, {"zfar", 9}, {"znear", 0.1}}}});
     g.json["nodes"].push_back({{"camera", 1},
                                {"name", "second"},
                                {"scale", {3, 3, 3}},
@@ -377,7 +378,8 @@ TEST(LoadScene, SaysWhatItLeavesOut) {
 
 TEST(BadScene, FilesThatAreNone) {
     EXPECT_THROW(loadScene(folder() / "missing.glb"), Error);
-    for (const std::string text : {"", "hello", "{}", "glTF", "glTF\2\0\0\0\xff\xff\xff\x7f", "{\"asset\":"}) {
+    for (const std::string text :
+         {"", "hello", "{}", "glTF", "glTF\2\0\0\0\xff\xff\xff\x7f", "{\"asset\":"}) {
         writeText(folder() / "bad.gltf", text);
         EXPECT_THROW(loadScene(folder() / "bad.gltf"), Error) << text;
     }
@@ -392,17 +394,15 @@ TEST(BadScene, EveryTruncationOfABinaryFileIsAnError) {
 }
 
 TEST(BadScene, ReferencesOutOfRange) {
-    expectFailure("accessor 77", [](GltfText& g) {
-        g.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 77;
-    });
+    expectFailure("accessor 77",
+                  [](GltfText& g) { g.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 77; });
     expectFailure("bufferView 55", [](GltfText& g) { g.json["accessors"][0]["bufferView"] = 55; });
     expectFailure("buffer 9", [](GltfText& g) { g.json["bufferViews"][0]["buffer"] = 9; });
     expectFailure("material 4", [](GltfText& g) { g.json["meshes"][0]["primitives"][0]["material"] = 4; });
     expectFailure("mesh 3", [](GltfText& g) { g.json["nodes"][0]["mesh"] = 3; });
     expectFailure("camera 3", [](GltfText& g) { g.json["nodes"][1]["camera"] = 3; });
-    expectFailure("light 3", [](GltfText& g) {
-        g.json["nodes"][2]["extensions"]["KHR_lights_punctual"]["light"] = 3;
-    });
+    expectFailure("light 3",
+                  [](GltfText& g) { g.json["nodes"][2]["extensions"]["KHR_lights_punctual"]["light"] = 3; });
     expectFailure("node 12", [](GltfText& g) { g.json["scenes"][0]["nodes"].push_back(12); });
     expectFailure("scene 5", [](GltfText& g) { g.json["scene"] = 5; });
     expectFailure("texture 6", [](GltfText& g) { g.json["materials"][0]["normalTexture"]["index"] = 6; });
@@ -416,9 +416,8 @@ TEST(BadScene, DataThatIsTooShort) {
     expectFailure("needs", [](GltfText& g) { g.json["accessors"][0]["byteOffset"] = 40; });
     expectFailure("needs", [](GltfText& g) { g.json["accessors"][0]["byteOffset"] = 4000000000u; });
     expectFailure("its buffer has", [](GltfText& g) { g.json["bufferViews"][0]["byteLength"] = 100000; });
-    expectFailure("no POSITION", [](GltfText& g) {
-        g.json["meshes"][0]["primitives"][0]["attributes"].erase("POSITION");
-    });
+    expectFailure("no POSITION",
+                  [](GltfText& g) { g.json["meshes"][0]["primitives"][0]["attributes"].erase("POSITION"); });
     expectFailure("has 3 elements", [](GltfText& g) { g.json["accessors"][1]["count"] = 3; });
     expectFailure("components", [](GltfText& g) { g.json["accessors"][0]["type"] = "VEC2"; });
     expectFailure("unsigned integers", [](GltfText& g) { g.json["accessors"][2]["componentType"] = 5126; });
@@ -450,9 +449,8 @@ TEST(BadScene, NumbersThatAreNone) {
     expectFailure("vertex 0 is not finite",
                   [](GltfText& g) { g.poke(0, std::numeric_limits<float>::infinity()); });
     expectFailure("no quaternion", [](GltfText& g) { g.json["nodes"][0]["rotation"] = {0, 0, 0, 0}; });
-    expectFailure("ior", [](GltfText& g) {
-        g.json["materials"][0]["extensions"]["KHR_materials_ior"]["ior"] = 0.5;
-    });
+    expectFailure(
+        "ior", [](GltfText& g) { g.json["materials"][0]["extensions"]["KHR_materials_ior"]["ior"] = 0.5; });
     expectFailure("intensity", [](GltfText& g) {
         g.json["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = -1;
     });
@@ -463,9 +461,8 @@ TEST(BadScene, NothingToSeeOrSeeBy) {
     expectFailure("no light", [](GltfText& g) { g.json["scenes"][0]["nodes"] = {0, 1}; });
     expectFailure("no triangles", [](GltfText& g) { g.json["scenes"][0]["nodes"] = {1, 2}; });
     expectFailure("more than one parent", [](GltfText& g) { g.json["nodes"][0]["children"] = {0}; });
-    expectFailure("KHR_draco_mesh_compression", [](GltfText& g) {
-        g.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-    });
+    expectFailure("KHR_draco_mesh_compression",
+                  [](GltfText& g) { g.json["extensionsRequired"] = {"KHR_draco_mesh_compression"}; });
 }
 
 /// Every byte of the JSON part damaged in turn: an error or a scene, never a crash.

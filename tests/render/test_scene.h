@@ -73,7 +73,8 @@ class TestScene {
             for (std::uint32_t j = 0; j <= 2 * n; ++j) {
                 const float theta = kPi * static_cast<float>(i) / static_cast<float>(n);
                 const float phi = kPi * static_cast<float>(j) / static_cast<float>(n);
-                const Vec3 d{std::sin(theta) * std::cos(phi), std::cos(theta), -std::sin(theta) * std::sin(phi)};
+                const Vec3 d{std::sin(theta) * std::cos(phi), std::cos(theta),
+                             -std::sin(theta) * std::sin(phi)};
                 scene_.vertices.push_back({centre + d * radius, d, {}});
             }
         }

@@ -23,9 +23,7 @@ struct SobolPoint {
 };
 
 /// The 24 leading digits as a float in [0, 1). Elementary intervals to depth 24 stay exact.
-constexpr float unitFloat(std::uint32_t fixedPoint) {
-    return static_cast<float>(fixedPoint >> 8) * 0x1p-24f;
-}
+constexpr float unitFloat(std::uint32_t fixedPoint) { return static_cast<float>(fixedPoint >> 8) * 0x1p-24f; }
 
 constexpr std::uint32_t reverseBits(std::uint32_t v) {
     v = __builtin_bswap32(v);
@@ -52,8 +50,9 @@ constexpr std::uint32_t sobolSecondDigits(std::uint32_t index) {
 /// digits before it. In a digit word these are the lower bits, and additions, odd multiplications and
 /// x ^= x * even only carry upwards: any composition of them is a nested scrambling, so elementary intervals
 /// map to elementary intervals exactly (Laine, Karras, "Stratified sampling for stochastic transparency",
-/// 2011). How random the flips are depends on the constants: these are Vegdahl's ("Building a better LK hash",
-/// 2021), which tests/base/sobol_test.cpp checks against a scrambling with an independent hash for each digit.
+/// 2011). How random the flips are depends on the constants: these are Vegdahl's ("Building a better LK
+/// hash", 2021), which tests/base/sobol_test.cpp checks against a scrambling with an independent hash for
+/// each digit.
 constexpr std::uint32_t scrambleDigits(std::uint32_t digits, std::uint32_t seed) {
     std::uint32_t d = digits;
     d ^= d * 0x3d20adeau;
@@ -90,8 +89,8 @@ constexpr SobolPoint scrambledSobolPoint(std::uint32_t index, SobolSeeds seeds) 
 /// A nested uniform permutation of indices: each aligned run of 2^m indices maps onto an aligned run of 2^m
 /// indices. Points taken in this order are still (0,2)-nets run by run, but are no longer correlated with
 /// another pair of dimensions taken in its own order: how two-dimensional sequences are padded to many
-/// dimensions (Kollig, Keller, "Efficient multidimensional sampling", 2002; Burley, "Practical hash-based Owen
-/// scrambling", 2020). `reversedIndex` is reverseBits(index), computed once for all dimensions.
+/// dimensions (Kollig, Keller, "Efficient multidimensional sampling", 2002; Burley, "Practical hash-based
+/// Owen scrambling", 2020). `reversedIndex` is reverseBits(index), computed once for all dimensions.
 constexpr std::uint32_t shuffledIndex(std::uint32_t reversedIndex, std::uint32_t seed) {
     return reverseBits(scrambleDigits(reversedIndex, seed));
 }
