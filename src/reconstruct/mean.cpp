@@ -23,7 +23,8 @@ Eigen::VectorXd borrowedVariance(const SampleBand& band, const BandLayout& layou
     around.y = std::max(band.y, row - ((row % kNeighbourhood) + kNeighbourhood) % kNeighbourhood);
     around.height = std::min(kNeighbourhood, band.y + band.height - around.y);
     const RegionData data = gatherRegion(band, layout, around, 1);
-    if (data.varianceKnown || data.size() < 2) return data.sampleVariance;
+    if (data.varianceKnown) return data.errorVariances.transpose() * data.counts / data.size();
+    if (data.size() < 2) return Eigen::VectorXd::Zero(data.means.cols());
     const Eigen::RowVectorXd mean = data.means.colwise().mean();
     return (data.means.rowwise() - mean).colwise().squaredNorm().transpose() / (data.size() - 1.0);
 }
@@ -49,9 +50,9 @@ Reconstruction reconstructMean(const DumpReader& dump, const Progress& progress)
                     ++empty;
                     continue;
                 }
-                const Eigen::VectorXd variance = pixel.varianceKnown
-                                                     ? pixel.sampleVariance
-                                                     : borrowedVariance(band, channels.layout, column, row);
+                const Eigen::VectorXd variance =
+                    pixel.varianceKnown ? Eigen::VectorXd(pixel.errorVariances.row(0) * pixel.counts[0])
+                                        : borrowedVariance(band, channels.layout, column, row);
                 float* out = result.image.at(column - result.image.data.x, row - result.image.data.y);
                 for (int c = 0; c < radiance; ++c) out[c] = static_cast<float>(pixel.means(0, c));
                 for (int c = 0; c < 3; ++c)

@@ -28,16 +28,30 @@ int pixelOf(const Window& pixels, double x, double y) {
     return row * pixels.width + col;
 }
 
+/// A pixel's samples are as many as an adaptive sampler saw fit: they must not outweigh its neighbours'.
+Eigen::VectorXd pixelWeights(const RegionData& data) {
+    Eigen::VectorXd samples = Eigen::VectorXd::Zero(data.pixels.pixels());
+    const auto pixel = [&](Eigen::Index i) {
+        return pixelOf(data.pixels, data.positions(i, 0), data.positions(i, 1));
+    };
+    for (Eigen::Index i = 0; i < data.size(); ++i) samples[pixel(i)] += data.counts[i];
+    Eigen::VectorXd weights(data.size());
+    for (Eigen::Index i = 0; i < data.size(); ++i) weights[i] = data.counts[i] / samples[pixel(i)];
+    return weights / weights.sum();
+}
+
 /// What a region's data say before any kriging.
 struct Moments {
-    Eigen::RowVectorXd mean;  // c: arithmetic mean of all samples
+    Eigen::VectorXd weights;  // n, sum 1: every pixel with data counts the same, in it every sample
+    Eigen::RowVectorXd mean;  // c: arithmetic mean
     Eigen::VectorXd errors;   // n: error variance of each datum, summed over R, G, B
     Eigen::Array3d spread;    // variance between the data, a colour
     double signal = 0;        // spread less errors, summed over colours, >= 0
 
-    Moments(const RegionData& data)
-        : mean(data.counts.transpose() * data.means / data.counts.sum()),
-          errors(data.sampleVariance.head(kColours).sum() / data.counts.array()),
+    explicit Moments(const RegionData& data)
+        : weights(pixelWeights(data)),
+          mean(weights.transpose() * data.means),
+          errors(data.errorVariances.leftCols(kColours).rowwise().sum()),
           spread((data.means.leftCols(kColours).rowwise() - mean.head(kColours))
                      .colwise()
                      .squaredNorm()
@@ -49,19 +63,19 @@ struct Moments {
 
 /// RGB of each pixel's first estimate, as a difference from the region's mean (see krigeRegion, 3).
 Eigen::MatrixXd firstEstimates(const RegionData& data, const Moments& moments) {
-    const Eigen::Index pixels = data.pixels.pixels();
+    const auto pixels = static_cast<Eigen::Index>(data.pixels.pixels());
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(pixels, kColours);
-    Eigen::VectorXd count = Eigen::VectorXd::Zero(pixels);
+    Eigen::VectorXd count = Eigen::VectorXd::Zero(pixels), error = count;
     for (Eigen::Index i = 0; i < data.size(); ++i) {
         const int pixel = pixelOf(data.pixels, data.positions(i, 0), data.positions(i, 1));
         sum.row(pixel) += data.counts[i] * (data.means.row(i) - moments.mean).head(kColours);
         count[pixel] += data.counts[i];
+        error[pixel] += data.counts[i] * data.counts[i] * moments.errors[i];
     }
-    const double sampleError = data.sampleVariance.head(kColours).sum();
     for (Eigen::Index p = 0; p < pixels; ++p) {
         if (count[p] == 0) continue;  // no estimate of its own: the region's mean, difference zero
-        const double error = sampleError / count[p];
-        const double share = moments.signal > 0 ? moments.signal / (moments.signal + error) : 0;
+        const double noise = error[p] / (count[p] * count[p]);
+        const double share = moments.signal > 0 ? moments.signal / (moments.signal + noise) : 0;
         sum.row(p) *= share / count[p];
     }
     return sum;
@@ -147,12 +161,12 @@ void useMean(RegionEstimate& estimate, const RegionData& data, const Moments& mo
              RegionOutcome outcome) {
     estimate.diagnostics.outcome = outcome;
     estimate.values.rowwise() = moments.mean;
+    const Eigen::RowVectorXd noise =
+        moments.weights.array().square().matrix().transpose() * data.errorVariances;
     for (int c = 0; c < kColours; ++c) {
-        const double noise = data.sampleVariance[c] / data.counts.sum();
-        const double signal =
-            std::max(0.0, moments.spread[c] - data.sampleVariance[c] * data.counts.cwiseInverse().mean());
+        const double signal = std::max(0.0, moments.spread[c] - data.errorVariances.col(c).mean());
         estimate.stddev.col(c).setConstant(
-            std::sqrt(noise + (outcome == RegionOutcome::NoStructure ? 0 : signal)));
+            std::sqrt(noise[c] + (outcome == RegionOutcome::NoStructure ? 0 : signal)));
     }
 }
 
@@ -160,14 +174,14 @@ void useMean(RegionEstimate& estimate, const RegionData& data, const Moments& mo
 /// by the weights exactly, the rest like the data's own variation.
 void colourErrors(RegionEstimate& estimate, const RegionData& data, const Moments& moments,
                   const KrigingPrediction& prediction) {
-    const Eigen::VectorXd noise = prediction.weights.array().square().matrix() * data.counts.cwiseInverse();
+    const Eigen::MatrixXd noise =
+        prediction.weights.array().square().matrix() * data.errorVariances.leftCols(kColours);
     const double spread = moments.spread.sum();
     for (int c = 0; c < kColours; ++c) {
         const double share = spread > 0 ? moments.spread[c] / spread : 1.0 / kColours;
         for (Eigen::Index p = 0; p < estimate.values.rows(); ++p) {
-            const double allNoise = noise[p] * data.sampleVariance.head(kColours).sum();
-            const double signal = std::max(0.0, prediction.variance[p] - allNoise) * share;
-            estimate.stddev(p, c) = std::sqrt(signal + noise[p] * data.sampleVariance[c]);
+            const double signal = std::max(0.0, prediction.variance[p] - noise.row(p).sum()) * share;
+            estimate.stddev(p, c) = std::sqrt(signal + noise(p, c));
         }
     }
 }
@@ -219,7 +233,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     if (data.size() == 0) return estimate;  // RegionOutcome::Empty
 
     const Moments moments(data);
-    diagnostics.errorVariance = data.sampleVariance.head(kColours).sum();
+    diagnostics.errorVariance = moments.errors.dot(data.counts) / data.size();
     const bool equal = (data.means.rowwise() - data.means.row(0)).cwiseAbs().maxCoeff() == 0;
     if (equal && diagnostics.errorVariance == 0) {
         useMean(estimate, data, moments, RegionOutcome::AllEqual);
@@ -249,7 +263,8 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     if (!data.varianceKnown && fit.model.nugget > 0) {
         // One sample a cell: what does not correlate with its neighbours is taken for noise.
         RegionData noisy = data;
-        noisy.sampleVariance.head(kColours) = (fit.model.nugget / spread * moments.spread).matrix();
+        noisy.errorVariances.leftCols(kColours).rowwise() =
+            (fit.model.nugget / spread * moments.spread).matrix().transpose();
         noisy.varianceKnown = true;
         return krigeRegion(noisy, options);
     }

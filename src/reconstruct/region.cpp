@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <vector>
 
 namespace vlx {
@@ -13,36 +15,116 @@ int cellAlong(double position, int pixel, int cells) {
     return static_cast<int>(std::clamp(std::floor((position - pixel) * cells), 0.0, cells - 1.0));
 }
 
-/// Sums over square groups of cells, 2^level cells wide, of a region's grid.
-struct Pooled {
-    Eigen::VectorXd squares;  // within groups, a channel
-    double freedom = 0;       // samples - groups
-    double samples = 0;
+/// The samples of a region, summed by cell: a grid of cells, row by row.
+struct Grid {
+    int pixelsWide, pixelsHigh, cells;  // cells along a pixel's side
+    std::vector<double> count;
+    Eigen::ArrayXXd sum, square;  // channels x cells, about a reference value
+
+    Grid(const Window& region, int cellsPerPixel, Eigen::Index channels)
+        : pixelsWide(region.width),
+          pixelsHigh(region.height),
+          cells(cellsPerPixel),
+          count(static_cast<std::size_t>(size())),
+          sum(Eigen::ArrayXXd::Zero(channels, size())),
+          square(sum) {}
+
+    Eigen::Index width() const { return Eigen::Index{pixelsWide} * cells; }
+    Eigen::Index size() const { return width() * pixelsHigh * cells; }
+    Eigen::Index pixels() const { return Eigen::Index{pixelsWide} * pixelsHigh; }
+    /// The cell (cx, cy) of a pixel, and the pixel of a cell.
+    Eigen::Index cell(Eigen::Index pixel, int cx, int cy) const {
+        return (pixel / pixelsWide * cells + cy) * width() + pixel % pixelsWide * cells + cx;
+    }
+    Eigen::Index pixel(Eigen::Index cell) const {
+        return cell / width() / cells * pixelsWide + cell % width() / cells;
+    }
+    double at(Eigen::Index cell) const { return count[static_cast<std::size_t>(cell)]; }
 };
 
-Pooled poolWithinGroups(const std::vector<double>& count, const Eigen::ArrayXXd& sum,
-                        const Eigen::ArrayXXd& square, int gridWidth, int gridHeight, int group) {
-    const Eigen::Index channels = sum.rows();
-    Pooled pooled;
-    pooled.squares = Eigen::VectorXd::Zero(channels);
-    for (int y0 = 0; y0 < gridHeight; y0 += group)
-        for (int x0 = 0; x0 < gridWidth; x0 += group) {
-            double n = 0;
-            Eigen::ArrayXd s = Eigen::ArrayXd::Zero(channels), q = Eigen::ArrayXd::Zero(channels);
-            for (int y = y0; y < y0 + group; ++y)
-                for (int x = x0; x < x0 + group; ++x) {
-                    const int cell = y * gridWidth + x;
-                    if (count[static_cast<std::size_t>(cell)] == 0) continue;
-                    n += count[static_cast<std::size_t>(cell)];
-                    s += sum.col(cell);
-                    q += square.col(cell);
-                }
-            if (n == 0) continue;
-            pooled.samples += n;
-            pooled.freedom += n - 1;
-            if (n > 1) pooled.squares.array() += (q - s * s / n).max(0.0);
+/// Sums over some cells.
+struct Group {
+    double count = 0;
+    Eigen::ArrayXd sum, square;
+
+    explicit Group(Eigen::Index channels)
+        : sum(Eigen::ArrayXd::Zero(channels)), square(Eigen::ArrayXd::Zero(channels)) {}
+
+    /// Adds size x size cells of a pixel.
+    void add(const Grid& grid, Eigen::Index pixel, int cx, int cy, int size) {
+        for (int i = 0; i < size * size; ++i) {
+            const Eigen::Index cell = grid.cell(pixel, cx + i % size, cy + i / size);
+            count += grid.at(cell);
+            sum += grid.sum.col(cell);
+            square += grid.square.col(cell);
         }
-    return pooled;
+    }
+    Eigen::ArrayXd squaresAboutMean() const { return (square - sum * sum / count).max(0.0); }
+};
+
+/// The pooled variance of one sample within the cells of `pixels`, of the finest size that holds two samples
+/// on average; nothing when no pixel holds two.
+std::optional<Eigen::VectorXd> varianceWithin(const Grid& grid, const std::vector<Eigen::Index>& pixels) {
+    for (int size = 1; size <= grid.cells && grid.cells % size == 0; size *= 2) {
+        Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(grid.sum.rows());
+        double freedom = 0, samples = 0;
+        for (const Eigen::Index pixel : pixels)
+            for (int y = 0; y < grid.cells; y += size)
+                for (int x = 0; x < grid.cells; x += size) {
+                    Group group(grid.sum.rows());
+                    group.add(grid, pixel, x, y, size);
+                    if (group.count == 0) continue;
+                    squares += group.squaresAboutMean();
+                    freedom += group.count - 1;
+                    samples += group.count;
+                }
+        const bool enough = 2 * freedom >= samples;
+        if (freedom > 0 && (enough || size == grid.cells)) return (squares / freedom).matrix();
+    }
+    return std::nullopt;
+}
+
+/// The variance between the means of `pixels`, image and noise together.
+Eigen::VectorXd varianceBetween(const Grid& grid, const std::vector<Eigen::Index>& pixels) {
+    Group means(grid.sum.rows());
+    for (const Eigen::Index pixel : pixels) {
+        Group group(grid.sum.rows());
+        group.add(grid, pixel, 0, 0, grid.cells);
+        means.count += 1;
+        means.sum += group.sum / group.count;
+        means.square += (group.sum / group.count).square();
+    }
+    return (means.squaresAboutMean() / (means.count - 1)).matrix();
+}
+
+/// Which pixels were sampled alike: counts from 3 * 4^k to less than four times that, so that a power of two
+/// less a few dropped samples stays with its like.
+int samplingClass(double count) { return static_cast<int>(std::floor(std::log2(count / 3) / 2)); }
+
+/// Fills errorVariances and varianceKnown, given the rest.
+void estimateErrors(RegionData& data, const Grid& grid, const std::vector<Eigen::Index>& pixelOfDatum) {
+    std::vector<double> pixelCount(static_cast<std::size_t>(grid.pixels()));
+    for (std::size_t i = 0; i < pixelOfDatum.size(); ++i)
+        pixelCount[static_cast<std::size_t>(pixelOfDatum[i])] += data.counts[static_cast<Eigen::Index>(i)];
+    std::map<int, std::vector<Eigen::Index>> classes;
+    for (Eigen::Index p = 0; p < grid.pixels(); ++p)
+        if (const double count = pixelCount[static_cast<std::size_t>(p)]; count > 0)
+            classes[samplingClass(count)].push_back(p);
+
+    std::map<int, Eigen::VectorXd> variances;
+    for (const auto& [key, pixels] : classes)
+        if (auto variance = varianceWithin(grid, pixels)) variances[key] = std::move(*variance);
+    data.errorVariances = Eigen::MatrixXd::Zero(data.size(), grid.sum.rows());
+    data.varianceKnown = !variances.empty();
+    if (!data.varianceKnown) return;
+    for (const auto& [key, pixels] : classes)
+        if (!variances.contains(key))
+            variances[key] = pixels.size() > 1 ? varianceBetween(grid, pixels) : variances.begin()->second;
+    for (Eigen::Index i = 0; i < data.size(); ++i) {
+        const auto pixel = static_cast<std::size_t>(pixelOfDatum[static_cast<std::size_t>(i)]);
+        data.errorVariances.row(i) =
+            variances.at(samplingClass(pixelCount[pixel])).transpose() / data.counts[i];
+    }
 }
 
 }  // namespace
@@ -53,17 +135,12 @@ RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const 
     assert(region.y >= band.y && region.y + region.height <= band.y + band.height);
     const bool positioned = layout.x >= 0 && layout.y >= 0;
     const int cells = positioned ? cellsPerPixel : 1;
-    const int gridWidth = region.width * cells, gridHeight = region.height * cells;
     const auto channels = static_cast<Eigen::Index>(layout.radiance.size());
 
     RegionData data;
     data.pixels = region;
     data.cellsPerPixel = cells;
-
-    const Eigen::Index grid = Eigen::Index{gridWidth} * gridHeight;
-    std::vector<double> count(static_cast<std::size_t>(grid), 0.0);
-    Eigen::ArrayXXd sum = Eigen::ArrayXXd::Zero(channels, grid);
-    Eigen::ArrayXXd square = Eigen::ArrayXXd::Zero(channels, grid);
+    Grid grid(region, cells, channels);
     Eigen::ArrayXd reference(channels), z(channels);
 
     for (int row = region.y; row < region.y + region.height; ++row)
@@ -92,42 +169,30 @@ RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const 
                 }
                 if (data.samples++ == 0) reference = z;
                 z -= reference;
-                const int cell =
-                    ((row - region.y) * cells + cy) * gridWidth + (column - region.x) * cells + cx;
-                count[static_cast<std::size_t>(cell)] += 1;
-                sum.col(cell) += z;
-                square.col(cell) += z * z;
+                const Eigen::Index cell =
+                    grid.cell(Eigen::Index{row - region.y} * region.width + column - region.x, cx, cy);
+                grid.count[static_cast<std::size_t>(cell)] += 1;
+                grid.sum.col(cell) += z;
+                grid.square.col(cell) += z * z;
             }
         }
 
-    const auto n =
-        static_cast<Eigen::Index>(std::count_if(count.begin(), count.end(), [](double k) { return k > 0; }));
+    const auto n = static_cast<Eigen::Index>(
+        std::count_if(grid.count.begin(), grid.count.end(), [](double k) { return k > 0; }));
     data.positions.resize(n, 2);
     data.means.resize(n, channels);
     data.counts.resize(n);
-    Eigen::Index i = 0;
-    for (int gy = 0; gy < gridHeight; ++gy)
-        for (int gx = 0; gx < gridWidth; ++gx) {
-            const int cell = gy * gridWidth + gx;
-            const double k = count[static_cast<std::size_t>(cell)];
-            if (k == 0) continue;
-            data.positions.row(i) << region.x + (gx + 0.5) / cells, region.y + (gy + 0.5) / cells;
-            data.means.row(i) = (reference + sum.col(cell) / k).matrix().transpose();
-            data.counts[i++] = k;
-        }
-
-    data.sampleVariance = Eigen::VectorXd::Zero(channels);
-    for (int group = 1; group <= cells; group *= 2) {
-        if (cells % group != 0) break;
-        const Pooled pooled = poolWithinGroups(count, sum, square, gridWidth, gridHeight, group);
-        // freedom >= samples / 2 means two samples a group or more; the whole pixel is the last resort.
-        const bool enough = 2 * pooled.freedom >= pooled.samples;
-        if (pooled.freedom > 0 && (enough || group == cells)) {
-            data.sampleVariance = pooled.squares / pooled.freedom;
-            data.varianceKnown = true;
-            break;
-        }
+    std::vector<Eigen::Index> pixelOfDatum;
+    for (Eigen::Index cell = 0, i = 0; cell < grid.size(); ++cell) {
+        const double k = grid.at(cell);
+        if (k == 0) continue;
+        data.positions.row(i) << region.x + (static_cast<double>(cell % grid.width()) + 0.5) / cells,
+            region.y + (static_cast<double>(cell / grid.width()) + 0.5) / cells;
+        data.means.row(i) = (reference + grid.sum.col(cell) / k).matrix().transpose();
+        data.counts[i++] = k;
+        pixelOfDatum.push_back(grid.pixel(cell));
     }
+    estimateErrors(data, grid, pixelOfDatum);
     return data;
 }
 

@@ -52,6 +52,7 @@ TEST(KrigeRegion, FewSamplesGiveTheirMean) {
         data.positions.conservativeResize(used, 2);
         data.means.conservativeResize(used, 3);
         data.counts.conservativeResize(used);
+        data.errorVariances.conservativeResize(used, 3);
         data.samples = used;
         const RegionEstimate estimate = krigeRegion(data, {});
         EXPECT_EQ(estimate.diagnostics.outcome, used == 0   ? RegionOutcome::Empty
@@ -72,7 +73,7 @@ TEST(KrigeRegion, NoiseFreeDataAreReproduced) {
         return MadeSample{z, z * z, 1, x, y};
     });
     RegionData data = gather(band);
-    data.sampleVariance.setZero();  // what the region has within pixels is signal
+    data.errorVariances.setZero();  // what the region has within pixels is signal
     const RegionEstimate estimate = krigeRegion(data, {.colourDistance = false});
     ASSERT_EQ(estimate.diagnostics.outcome, RegionOutcome::Kriged);
     for (int p = 0; p < 16; ++p) {

@@ -29,7 +29,7 @@ TEST(GatherRegion, MeansAndCountsOfSubPixelCells) {
     EXPECT_EQ(data.counts[1], 2);
 }
 
-TEST(GatherRegion, SampleVarianceIsPooledWithinTheFinestCellsOfTwoSamples) {
+TEST(GatherRegion, ErrorVariancesArePooledWithinTheFinestCellsOfTwoSamples) {
     // 32 samples a pixel, two in each cell, whose pixel values differ by 1000: only the difference within
     // cells, 2, may count: variance 2 for every pair.
     const SampleBand band = makeBand({0, 0, 4, 4}, 32, [](int column, int row, int i) {
@@ -40,9 +40,30 @@ TEST(GatherRegion, SampleVarianceIsPooledWithinTheFinestCellsOfTwoSamples) {
     const RegionData data = gatherRegion(band, madeLayout(), {0, 0, 4, 4}, 4);
     EXPECT_TRUE(data.varianceKnown);
     EXPECT_EQ(data.size(), 256);
-    EXPECT_NEAR(data.sampleVariance[0], 2, 1e-6);
-    EXPECT_NEAR(data.sampleVariance[1], 8, 4e-6);
-    EXPECT_EQ(data.sampleVariance[2], 0);
+    EXPECT_NEAR(data.errorVariances(0, 0), 1, 1e-6);  // of the mean of two
+    EXPECT_NEAR(data.errorVariances(255, 1), 4, 4e-6);
+    EXPECT_EQ(data.errorVariances.col(2).maxCoeff(), 0);
+}
+
+TEST(GatherRegion, AdaptiveCountsPoolQuietAndNoisyPixelsApart) {
+    // Left half: 4 samples of +-0.1; right half: 64 of +-10. One variance for both would drown the left half.
+    SampleBand band{0, 0, 4, 4, {0}, {"R", "G", "B", "sample.x", "sample.y"}, {}};
+    band.values.resize(5);
+    for (int p = 0; p < 16; ++p) {
+        const bool quiet = p % 4 < 2;
+        for (int i = 0; i < (quiet ? 4 : 64); ++i) {
+            const float z = (i % 2 == 0 ? 1.0f : -1.0f) * (quiet ? 0.1f : 10.0f);
+            int c = 0;
+            for (const float value :
+                 {z, z, z, static_cast<float>(p % 4) + 0.5f, static_cast<float>(p / 4) + 0.5f})
+                band.values[static_cast<std::size_t>(c++)].push_back(value);
+        }
+        band.offsets.push_back(band.values[0].size());
+    }
+    const RegionData data = gatherRegion(band, madeLayout(), {0, 0, 4, 4}, 1);
+    ASSERT_EQ(data.size(), 16);
+    EXPECT_NEAR(data.errorVariances(0, 0), 0.01 * 4 / 3 / 4, 1e-8);
+    EXPECT_NEAR(data.errorVariances(3, 0), 100.0 * 64 / 63 / 64, 1e-6);
 }
 
 TEST(GatherRegion, VarianceIsUnknownWithOneSampleAPixel) {
@@ -51,7 +72,7 @@ TEST(GatherRegion, VarianceIsUnknownWithOneSampleAPixel) {
     });
     const RegionData data = gatherRegion(band, madeLayout(), {0, 0, 4, 4}, 4);
     EXPECT_FALSE(data.varianceKnown);
-    EXPECT_EQ(data.sampleVariance.maxCoeff(), 0);
+    EXPECT_EQ(data.errorVariances.maxCoeff(), 0);
 }
 
 TEST(GatherRegion, DropsNonFiniteSamplesAndCountsThem) {
@@ -83,7 +104,7 @@ TEST(GatherRegion, VarianceOfAnOffsetLosesNoDigits) {
     const SampleBand band = makeBand({0, 0, 1, 1}, 2, [](int, int, int i) {
         return MadeSample{1e6f + static_cast<float>(i), 0, 0, 0.5f, 0.5f};
     });
-    EXPECT_DOUBLE_EQ(gatherRegion(band, madeLayout(), {0, 0, 1, 1}, 1).sampleVariance[0], 0.5);
+    EXPECT_DOUBLE_EQ(gatherRegion(band, madeLayout(), {0, 0, 1, 1}, 1).errorVariances(0, 0), 0.25);
 }
 
 }  // namespace

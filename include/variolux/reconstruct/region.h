@@ -17,7 +17,7 @@ struct RegionData {
     Eigen::MatrixXd positions;       ///< n x 2: centres of the cells, raster pixels
     Eigen::MatrixXd means;           ///< n x c: arithmetic means
     Eigen::VectorXd counts;          ///< n: samples in each cell
-    Eigen::VectorXd sampleVariance;  ///< c: variance of one sample's error (below); 0 when unknown
+    Eigen::MatrixXd errorVariances;  ///< n x c: of the means (below); 0 when unknown
     bool varianceKnown = false;      ///< false when no cell of a pixel or smaller holds two samples
     std::int64_t samples = 0;        ///< usable samples
     std::int64_t dropped = 0;        ///< samples with a non-finite value in any channel: left out
@@ -38,11 +38,13 @@ struct BandLayout {
 /// A sample belongs to the cell of its own pixel that its position falls in; positions outside the pixel (a
 /// wide pixel filter) go to the nearest cell of the pixel.
 ///
-/// sampleVariance is the mean residual variance over the region (METHOD.md section 3): the pooled unbiased
-/// variance sum (z - mean of its cell)^2 / sum (count - 1), over cells of 1, 1/2, 1/4 ... pixel. The finest
-/// size whose cells hold two samples or more on average is taken, so that the image's own variation adds as
-/// little as possible to it. Sums are formed about the region's first sample: values far from zero cancel
-/// nothing.
+/// An error variance is that of one sample over the number of samples in the cell. One sample's is the mean
+/// residual variance over the region (METHOD.md section 3): the pooled unbiased variance sum (z - mean of its
+/// cell)^2 / sum (count - 1), over cells of 1, 1/2, 1/4 ... pixel. The finest size whose cells hold two
+/// samples or more on average is taken, so that the image's own variation adds as little as possible to it.
+/// An adaptive sampler puts its samples where the variance is: pixels of very different counts (a factor of
+/// four) are pooled apart; those with one sample take the variance between them. Sums are formed about the
+/// region's first sample: values far from zero cancel nothing.
 RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const Window& region,
                         int cellsPerPixel);
 
