@@ -436,10 +436,9 @@ TEST(BadScene, MissingBuffersAndImages) {
     expectFailure("neither PNG nor JPEG", [](GltfText& g) {
         g.json["materials"][0]["normalTexture"]["index"] = g.texture({1, 2, 3, 4, 5, 6, 7, 8});
     });
+    // Not a broken PNG: OpenImageIO 2.4 leaks a string there (libpng leaves by longjmp).
     expectFailure("cannot be decoded", [](GltfText& g) {
-        std::vector<unsigned char> broken = png(2, 1, {0, 0, 0, 1, 1, 1});
-        broken.resize(40);
-        g.json["materials"][0]["normalTexture"]["index"] = g.texture(broken);
+        g.json["materials"][0]["normalTexture"]["index"] = g.texture({0xff, 0xd8, 0xff, 0xe0, 0, 1, 2, 3});
     });
 }
 
