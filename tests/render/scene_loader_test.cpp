@@ -85,6 +85,13 @@ TEST(LoadScene, NodeTransformsMultiplyDownTheTree) {
     EXPECT_NEAR(s.boundsMin.x, 4, 1e-5f);
     EXPECT_NEAR(s.boundsMax.y, 2, 1e-5f);
     EXPECT_NEAR(s.boundsMax.z, -1, 1e-5f);
+    GltfText own;  // scale, rotation and translation of one node, in this order
+    own.json["nodes"][0]["scale"] = {2, 1, 1};
+    own.json["nodes"][0]["rotation"] = {0, 0, std::sqrt(0.5), std::sqrt(0.5)};
+    own.json["nodes"][0]["translation"] = {5, 0, 0};
+    const Scene turned = load(own);
+    EXPECT_NEAR(turned.boundsMin.x, 4, 1e-5f);
+    EXPECT_NEAR(turned.boundsMax.y, 2, 1e-5f);
     GltfText m;
     m.json["nodes"][0]["matrix"] = {1, 0, 0, 0, 0, 3, 0, 0, 0, 0, 1, 0, 7, 8, 9, 1};
     EXPECT_EQ(load(m).boundsMax, (Vec3{8, 11, 9}));
