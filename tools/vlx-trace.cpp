@@ -164,7 +164,7 @@ struct TraceCommand {
     void summarize(const Scene& loaded, const RenderReport& report) const {
         const double seconds = report.traceSeconds;
         const double rate = seconds > 0 ? static_cast<double>(report.samples) / seconds * 1e-6 : 0;
-        const double cpu = seconds * vlx::threadCount();
+        const double cpu = report.traceCpuSeconds;
         const double share = cpu > 0 ? report.writeCpuSeconds / cpu : 0;
         if (json) {
             nlohmann::ordered_json j{{"scene", scene},
@@ -180,6 +180,7 @@ struct TraceCommand {
                                      {"threads", vlx::threadCount()},
                                      {"traceSeconds", seconds},
                                      {"megasamplesPerSecond", rate},
+                                     {"traceCpuSeconds", report.traceCpuSeconds},
                                      {"writeCpuSeconds", report.writeCpuSeconds},
                                      {"warnings", loaded.report.warnings}};
             if (options.hierarchical) j["refinedCells"] = report.refinedCells;
@@ -187,7 +188,7 @@ struct TraceCommand {
         }
         std::fprintf(stderr,
                      "%s: %llu samples in %.2f s (%.3f Msamples/s, %d threads); compressing and writing took "
-                     "%.2f processor seconds (%.1f %% of tracing)\n",
+                     "%.2f processor seconds (%.1f %% of tracing's)\n",
                      dump.c_str(), static_cast<unsigned long long>(report.samples), seconds, rate,
                      vlx::threadCount(), report.writeCpuSeconds, 100 * share);
     }

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cassert>
 #include <chrono>
+#include <ctime>
 #include <limits>
 
 #include "effects.h"
@@ -220,6 +221,7 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     };
 
     RenderReport report;
+    const std::clock_t cpuStart = std::clock();
     using Clock = std::chrono::steady_clock;
     for (int y = window.y; y < window.y + window.height;) {
         const int end = std::min(floorToRegion(y) + bandRows, window.y + window.height);
@@ -238,6 +240,8 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     }
     writer.close(report.traceSeconds);
     report.writeCpuSeconds = writer.cpuSeconds();
+    report.traceCpuSeconds =
+        static_cast<double>(std::clock() - cpuStart) / CLOCKS_PER_SEC - report.writeCpuSeconds;
     return report;
 }
 

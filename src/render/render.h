@@ -35,6 +35,7 @@ struct RenderReport {
     std::uint64_t samples = 0;
     std::uint64_t nonFinite = 0;  ///< samples whose radiance overflowed: written as 0, counted here
     double traceSeconds = 0;      ///< wall time of tracing
+    double traceCpuSeconds = 0;   ///< processor time of the process, writing taken off
     double writeCpuSeconds = 0;   ///< processor time of compressing and writing
     std::vector<std::uint64_t> refinedCells;  ///< hierarchical: cells refined at each level
 };

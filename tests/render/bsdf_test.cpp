@@ -14,8 +14,10 @@ namespace {
 
 #ifdef VARIOLUX_SANITIZED
 constexpr std::uint32_t kSamples = 1 << 12;
+constexpr float kEnergyTolerance = 0.03f;  // fewer samples
 #else
 constexpr std::uint32_t kSamples = 1 << 15;
+constexpr float kEnergyTolerance = 0.01f;
 #endif
 
 /// A surface to test, seen from one direction.
@@ -104,7 +106,7 @@ TEST(WhiteFurnace, EveryWhiteSurfaceReturnsWhatItGets) {
     for (const Case& c : whiteCases()) {
         const Rgb energy = furnace(c);
         worst = std::max(worst, std::abs(energy.y - 1.0));
-        EXPECT_NEAR(energy.y, 1, 0.01) << label(c);
+        EXPECT_NEAR(energy.y, 1, kEnergyTolerance) << label(c);
     }
     RecordProperty("worst", std::to_string(worst));
 }
@@ -114,7 +116,7 @@ TEST(WhiteFurnace, ColouredSurfacesGiveLessInEveryChannel) {
         c.surface.baseColour = {0.9f, 0.5f, 0.1f};
         c.surface.specularColour = {0.3f, 1, 3};  // rough glass is compensated for its untinted reflection
         const Rgb energy = furnace(c);
-        EXPECT_LE(maxComponent(energy), 1.02f) << label(c);
+        EXPECT_LE(maxComponent(energy), 1 + 2 * kEnergyTolerance) << label(c);
         EXPECT_GE(energy.z, 0) << label(c);
     }
 }
@@ -255,9 +257,9 @@ TEST(Bsdf, EvaluateIntegratesToWhatSamplesGive) {
             sum[2] += f.z * solidAngle;
         });
         const Rgb sampled = furnace(c);
-        EXPECT_NEAR(sampled.x, sum[0], 0.012) << label(c);
-        EXPECT_NEAR(sampled.y, sum[1], 0.012) << label(c);
-        EXPECT_NEAR(sampled.z, sum[2], 0.012) << label(c);
+        EXPECT_NEAR(sampled.x, sum[0], kEnergyTolerance + 0.002f) << label(c);
+        EXPECT_NEAR(sampled.y, sum[1], kEnergyTolerance + 0.002f) << label(c);
+        EXPECT_NEAR(sampled.z, sum[2], kEnergyTolerance + 0.002f) << label(c);
     }
 }
 

@@ -177,6 +177,19 @@ TEST(Uniform, EachPixelIsStratified) {
     }
 }
 
+TEST(Uniform, FarFromTheOriginRoundingKeepsSamplesInTheirPixels) {
+    const int far = (1 << 20) - 8;  // a float has 4 bits left for the position in the pixel
+    const auto check = [](const CameraSample& s) {
+        EXPECT_EQ(std::floor(s.x), s.column);
+        EXPECT_EQ(std::floor(s.y), s.row);
+        return Rgb();
+    };
+    sampleUniformly({far, far, 2, 2}, 64, 1, 9, check);
+    HierarchicalOptions options;
+    options.tolerance = 0;
+    sampleHierarchically({far, far, 4, 4}, far / 4, far / 4, options, 9, check);
+}
+
 TEST(Uniform, MoreSamplesBeginWithTheFewer) {
     const auto collect = [](int spp) {
         std::vector<std::pair<float, float>> positions;

@@ -85,6 +85,13 @@ TEST(LoadScene, NodeTransformsMultiplyDownTheTree) {
     EXPECT_NEAR(s.boundsMin.x, 4, 1e-5f);
     EXPECT_NEAR(s.boundsMax.y, 2, 1e-5f);
     EXPECT_NEAR(s.boundsMax.z, -1, 1e-5f);
+    GltfText own;  // scale, rotation and translation of one node, in this order
+    own.json["nodes"][0]["scale"] = {2, 1, 1};
+    own.json["nodes"][0]["rotation"] = {0, 0, std::sqrt(0.5), std::sqrt(0.5)};
+    own.json["nodes"][0]["translation"] = {5, 0, 0};
+    const Scene turned = load(own);
+    EXPECT_NEAR(turned.boundsMin.x, 4, 1e-5f);
+    EXPECT_NEAR(turned.boundsMax.y, 2, 1e-5f);
     GltfText m;
     m.json["nodes"][0]["matrix"] = {1, 0, 0, 0, 0, 3, 0, 0, 0, 0, 1, 0, 7, 8, 9, 1};
     EXPECT_EQ(load(m).boundsMax, (Vec3{8, 11, 9}));
@@ -436,10 +443,9 @@ TEST(BadScene, MissingBuffersAndImages) {
     expectFailure("neither PNG nor JPEG", [](GltfText& g) {
         g.json["materials"][0]["normalTexture"]["index"] = g.texture({1, 2, 3, 4, 5, 6, 7, 8});
     });
+    // Not a broken PNG: OpenImageIO 2.4 leaks a string there (libpng leaves by longjmp).
     expectFailure("cannot be decoded", [](GltfText& g) {
-        std::vector<unsigned char> broken = png(2, 1, {0, 0, 0, 1, 1, 1});
-        broken.resize(40);
-        g.json["materials"][0]["normalTexture"]["index"] = g.texture(broken);
+        g.json["materials"][0]["normalTexture"]["index"] = g.texture({0xff, 0xd8, 0xff, 0xe0, 0, 1, 2, 3});
     });
 }
 
