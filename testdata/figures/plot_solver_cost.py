@@ -8,13 +8,13 @@ import math
 import re
 import sys
 
-# name, colour, dashes, marker radius
+# name, colour, dashes, line width: coinciding lines are drawn one inside another
 SERIES = [
-    ("bare LLT", "#777777", "5 3"),
-    ("double", "#1b5fa8", ""),
-    ("float, refined", "#d9822b", ""),
-    ("batched", "#2a8f4f", ""),
-    ("full-pivot LU, bordered", "#b3322e", ""),
+    ("bare LLT", "#777777", "5 3", 2),
+    ("double", "#1b5fa8", "", 1.6),
+    ("float, refined", "#eda24f", "", 4.2),
+    ("batched", "#86cf9f", "", 7),
+    ("full-pivot LU, bordered", "#b3322e", "", 1.6),
 ]
 NUMBER = r"[-+0-9.e]+"
 WIDTH, HEIGHT = 960, 420
@@ -76,15 +76,15 @@ class Panel:
         self.text(self.left + PANEL_WIDTH / 2, TOP - 40, title, font_size=14, font_weight="bold")
         self.text(self.left + PANEL_WIDTH / 2, bottom + 38, x_label)
         middle = TOP + PANEL_HEIGHT / 2
-        self.text(self.left - 44, middle, y_label, transform=f"rotate(-90 {self.left - 44} {middle})")
+        self.text(self.left - 52, middle, y_label, transform=f"rotate(-90 {self.left - 52} {middle})")
 
     def line(self, points, series):
-        _, colour, dashes = series
+        _, colour, dashes, width = series
         path = "M" + "L".join(f"{self.x(x):.1f} {self.y(y):.1f}" for x, y in points)
         dash = f' stroke-dasharray="{dashes}"' if dashes else ""
-        self.svg.append(f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>')
+        self.svg.append(f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{width}"{dash}/>')
         for x, y in points:
-            self.svg.append(f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="3" fill="{colour}"/>')
+            self.svg.append(f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="{1.8 + width / 2:.1f}" fill="{colour}"/>')
 
 
 def power_ticks(low, high, step):
@@ -104,21 +104,21 @@ def main():
     left = Panel(80, (times[0][0] / 1.15, times[-1][0] * 1.15), (10.0**low, 10.0**high))
     left.axes("Time of one system", "number of data n", "microseconds (stable model, one core)",
               [(row[0], f"{row[0]:.0f}") for row in times], power_ticks(low, high, 1))
-    for k, series in enumerate(SERIES):
+    for k, series in sorted(enumerate(SERIES), key=lambda e: -e[1][3]):
         left.line([(row[0], row[k + 1]) for row in times], series)
 
     low, high = decades([v for row in errors for v in row[1:]])
     x_low, x_high = decades([row[0] for row in errors])
-    right = Panel(540, (10.0**x_low, 10.0**x_high), (10.0**low, 10.0**high))
+    right = Panel(570, (10.0**x_low, 10.0**x_high), (10.0**low, 10.0**high))
     right.axes("Error of the estimate", "condition number of the covariance matrix", "largest error of 5 systems, n = 40",
                power_ticks(x_low, x_high, 2), power_ticks(low, high, 2))
-    for k, series in reversed(list(enumerate(SERIES[1:]))):
+    for k, series in sorted(enumerate(SERIES[1:]), key=lambda e: -e[1][3]):
         right.line([(row[0], row[k + 1]) for row in errors], series)
 
     legend, x = [], 80
-    for name, colour, dashes in SERIES:
+    for name, colour, dashes, width in SERIES:
         dash = f' stroke-dasharray="{dashes}"' if dashes else ""
-        legend.append(f'<path d="M{x} {TOP - 18}h26" stroke="{colour}" stroke-width="2"{dash}/>'
+        legend.append(f'<path d="M{x} {TOP - 18}h26" stroke="{colour}" stroke-width="{width}"{dash}/>'
                       f'<text x="{x + 32}" y="{TOP - 14}">{name}</text>')
         x += 60 + 7 * len(name)
     svg = "\n".join(left.svg + right.svg + legend)
