@@ -3,17 +3,12 @@
 #include <cmath>
 #include <limits>
 
+#include "kriging_names.h"
 #include "variolux/geostat/covariance_system.h"
 
 namespace vlx {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::RowVectorXd;
-using Eigen::VectorXd;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMostSingleSteps = 8;
 
 /// A few right-hand sides are quicker one at a time.

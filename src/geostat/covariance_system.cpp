@@ -3,24 +3,17 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 
 #include "kernels.h"
+#include "kriging_names.h"
 
 namespace vlx {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::RowVectorXd;
-using Eigen::VectorXd;
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 /// Below these a float factor converges by refinement; a double factor needs none.
 constexpr double kLargestSingleCondition = 1e5;
 constexpr double kLargestPlainCondition = 1e4;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// A power of two near x > 0: scaling by it rounds nothing.
 double powerOfTwo(double x) { return std::ldexp(1.0, std::ilogb(x)); }

@@ -2,24 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <sstream>
 
 #include "kernels.h"
+#include "kriging_names.h"
 
 namespace vlx {
-namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::RowVectorXd;
-using Eigen::VectorXd;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 /// One target: a point, or the points of a block with weights that sum to 1.
 struct KrigingSystem::Block {

@@ -87,8 +87,9 @@ class LaneWriter {
         bounds(p.positions);
         if (!model(p) || !places(p, t) || !errors(p)) return false;
         for (Index i = 0; i < b_.n; ++i) at(b_.active, i) = i < n ? 1 : 0;
+        if (!p.drift.external.allFinite() || !t.externalDrift.allFinite()) return false;
         driftRows(p, t);
-        return values(p) && finite_ == 0;
+        return values(p);
     }
 
     /// The reference that was subtracted from each value column.
@@ -99,11 +100,6 @@ class LaneWriter {
         return array[static_cast<std::size_t>(entry * b_.lanes + lane_)];
     }
     double& at(double* row, Index entry) { return row[entry * b_.lanes + lane_]; }
-    /// Becomes NaN, and stays, once x is not finite.
-    double checked(double x) {
-        finite_ += x * 0;
-        return x;
-    }
 
     void bounds(const MatrixXd& positions) {
         const Index d = positions.cols();
@@ -140,11 +136,12 @@ class LaneWriter {
         }
         const MatrixXd& data = transformed ? x : p.positions;
         const MatrixXd& points = transformed ? y : t.points;
+        if (!data.allFinite()) return false;
         double squaredExtent = 0;
         for (Index k = 0; k < b_.axes; ++k) {
             double low = data(0, k), high = low;
             for (Index i = 0; i < n; ++i) {
-                const double v = checked(data(i, k));
+                const double v = data(i, k);
                 low = std::min(low, v);
                 high = std::max(high, v);
                 at(b_.places, i * b_.axes + k) = v;
@@ -155,7 +152,7 @@ class LaneWriter {
                 at(b_.places, i * b_.axes + k) =
                     high + (std::abs(high) + (high - low) + 1) * static_cast<double>(i - n + 1);
             for (Index j = 0; j < b_.targets; ++j) {
-                const double v = checked(points(j, k));
+                const double v = points(j, k);
                 if (!ordinary(v)) return false;
                 at(b_.points, j * b_.axes + k) = v;
             }
@@ -169,7 +166,7 @@ class LaneWriter {
     bool errors(const KrigingProblem& p) {
         const Index n = p.positions.rows();
         for (Index i = 0; i < b_.n; ++i) {
-            const double v = i < n && p.errorVariances.size() > 0 ? checked(p.errorVariances[i]) : 0;
+            const double v = i < n && p.errorVariances.size() > 0 ? p.errorVariances[i] : 0;
             if (!(v >= 0) || !ordinary(v)) return false;
             at(b_.diagonal, i) = p.model.nugget + v;
             at(b_.special, i) = i < n && (v == 0 || p.model.nugget > 0) ? 1 : 0;
@@ -184,9 +181,9 @@ class LaneWriter {
         const Index n = p.positions.rows(), d = p.drift.axes == 0 ? p.positions.cols() : p.drift.axes;
         const auto put = [&](Index column, auto&& data, auto&& target) {
             double* row = b_.row(b_.driftRow() + column);
-            for (Index i = 0; i < n; ++i) at(row, i) = checked(data(i));
+            for (Index i = 0; i < n; ++i) at(row, i) = data(i);
             for (Index i = n; i < b_.n; ++i) at(row, i) = 0;
-            for (Index j = 0; j < b_.targets; ++j) at(b_.f0, j * b_.drift + column) = checked(target(j));
+            for (Index j = 0; j < b_.targets; ++j) at(b_.f0, j * b_.drift + column) = target(j);
         };
         Index column = 0;
         const bool constant = p.drift.polynomial != DriftPolynomial::None;
@@ -238,7 +235,7 @@ class LaneWriter {
             double* row = b_.row(b_.valueRow() + c);
             for (Index i = 0; i < n; ++i) {
                 if (!ordinary(p.values(i, c))) return false;
-                at(row, i) = checked(p.values(i, c) - reference_[c]);
+                at(row, i) = p.values(i, c) - reference_[c];
             }
             for (Index i = n; i < b_.n; ++i) at(row, i) = 0;
         }
@@ -247,7 +244,7 @@ class LaneWriter {
 
     Batch& b_;
     Index lane_;
-    double sill_ = 0, unit_ = 1, finite_ = 0;
+    double sill_ = 0, unit_ = 1;
     VectorXd origin_;
     Eigen::RowVectorXd reference_;
 };

@@ -1,21 +1,14 @@
 // KrigingSystem's preparation of data: validation, scales, coincident data.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <sstream>
 
+#include "kriging_names.h"
 #include "variolux/geostat/kriging.h"
 
 namespace vlx {
 namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::RowVectorXd;
-using Eigen::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// 2^-floor(log2(x)): brings x > 0 into [1, 2) without rounding anything.
 double unitScale(double x) {

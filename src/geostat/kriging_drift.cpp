@@ -1,22 +1,11 @@
 // KrigingSystem's drift coefficients and leave-one-out.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "kriging_names.h"
 #include "variolux/geostat/kriging.h"
 
 namespace vlx {
-namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::RowVectorXd;
-using Eigen::VectorXd;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 DriftEstimate KrigingSystem::drift() const {
     if (!report_.ok()) return {};

@@ -1,14 +1,13 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "csv.h"
 #include "oracle.h"
 #include "variolux/geostat/empirical_variogram.h"
 #include "variolux/geostat/variogram_fit.h"
@@ -17,61 +16,16 @@
 namespace {
 
 using vlx::StructureType;
-
-/// A comma-separated table with a header line; fields may be quoted.
-class Table {
-  public:
-    explicit Table(const std::string& path) {
-        std::ifstream file(path);
-        if (!file) throw std::runtime_error(path + ": cannot be read");
-        std::string line;
-        std::getline(file, line);
-        const std::vector<std::string> names = split(line);
-        for (std::size_t i = 0; i < names.size(); ++i) columns_[names[i]] = i;
-        while (std::getline(file, line))
-            if (!line.empty()) rows_.push_back(split(line));
-    }
-
-    std::size_t size() const { return rows_.size(); }
-    bool has(const std::string& column) const { return columns_.count(column) > 0; }
-    const std::string& text(std::size_t row, const std::string& column) const {
-        return rows_.at(row).at(columns_.at(column));
-    }
-    double number(std::size_t row, const std::string& column) const { return std::stod(text(row, column)); }
-    Eigen::VectorXd numbers(const std::string& column) const {
-        Eigen::VectorXd values(static_cast<Eigen::Index>(rows_.size()));
-        for (std::size_t i = 0; i < rows_.size(); ++i)
-            values[static_cast<Eigen::Index>(i)] = number(i, column);
-        return values;
-    }
-
-  private:
-    static std::vector<std::string> split(const std::string& line) {
-        std::vector<std::string> fields(1);
-        bool quoted = false;
-        for (const char c : line) {
-            if (c == '"')
-                quoted = !quoted;
-            else if (c == ',' && !quoted)
-                fields.emplace_back();
-            else if (c != '\r')
-                fields.back() += c;
-        }
-        return fields;
-    }
-
-    std::map<std::string, std::size_t> columns_;
-    std::vector<std::vector<std::string>> rows_;
-};
+using vlx::testing::CsvTable;
 
 /// "x" or "sqrt(x)".
-Eigen::VectorXd term(const Table& data, const std::string& name) {
+Eigen::VectorXd term(const CsvTable& data, const std::string& name) {
     if (name.rfind("sqrt(", 0) == 0) return data.numbers(name.substr(5, name.size() - 6)).cwiseSqrt();
     return data.numbers(name);
 }
 
 /// A column, or "ols-residual of z~a+b".
-Eigen::VectorXd variable(const Table& data, const std::string& name) {
+Eigen::VectorXd variable(const CsvTable& data, const std::string& name) {
     const std::string prefix = "ols-residual of ";
     if (name.rfind(prefix, 0) != 0) return data.numbers(name);
     const std::size_t tilde = name.find('~');
@@ -109,14 +63,14 @@ vlx::VariogramModel modelOf(const std::string& code, double nugget, double sill,
 }
 
 OracleCount runEmpirical(const std::string& dir) {
-    const Table table(dir + "/empirical_variograms_exact.csv");
+    const CsvTable table(dir + "/empirical_variograms_exact.csv");
     std::map<std::pair<std::string, std::string>, std::vector<std::size_t>> groups;
     for (std::size_t i = 0; i < table.size(); ++i)
         groups[{table.text(i, "dataset") + "," + table.text(i, "variable"), table.text(i, "estimator")}]
             .push_back(i);
     OracleCount counts;
     for (const auto& [key, rows] : groups) {
-        const Table data(dir + "/" + table.text(rows[0], "dataset") + "_data.csv");
+        const CsvTable data(dir + "/" + table.text(rows[0], "dataset") + "_data.csv");
         Eigen::MatrixXd positions(static_cast<Eigen::Index>(data.size()), 2);
         positions << data.numbers("x"), data.numbers("y");
         const Eigen::VectorXd z = variable(data, table.text(rows[0], "variable"));
@@ -146,7 +100,7 @@ OracleCount runEmpirical(const std::string& dir) {
 }
 
 OracleCount runCurves(const std::string& dir) {
-    const Table models(dir + "/models.csv"), curves(dir + "/model_curves_gstat.csv");
+    const CsvTable models(dir + "/models.csv"), curves(dir + "/model_curves_gstat.csv");
     std::map<std::string, vlx::VariogramModel> byName;
     for (std::size_t i = 0; i < models.size(); ++i)
         byName[models.text(i, "dataset") + "," + models.text(i, "model")] =
@@ -179,7 +133,7 @@ vlx::VariogramModel initialModel(const std::string& dataset, const std::string& 
 }
 
 OracleCount runFits(const std::string& dir) {
-    const Table fits(dir + "/fits_exact.csv"), table(dir + "/empirical_variograms_exact.csv");
+    const CsvTable fits(dir + "/fits_exact.csv"), table(dir + "/empirical_variograms_exact.csv");
     std::map<std::string, vlx::EmpiricalVariogram> variograms;
     std::map<std::string, double> longest;
     for (std::size_t i = 0; i < table.size(); ++i) {

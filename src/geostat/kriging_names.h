@@ -1,0 +1,18 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+/// Names that the source files of KrigingSystem and CovarianceSystem share.
+namespace vlx {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace vlx
