@@ -17,8 +17,11 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
     const fs::path target(path_);
     if (target.filename().empty()) throw Error(path_, "expected the name of an output file, found none");
     std::error_code ignored;
-    if (fs::is_directory(target, ignored))
-        throw Error(path_, "expected the name of an output file, found a folder");
+    const fs::file_status found = fs::status(target, ignored);
+    if (fs::is_directory(found)) throw Error(path_, "expected the name of an output file, found a folder");
+    // The finished file takes the name over: a device such as /dev/null would be gone.
+    if (fs::exists(found) && !fs::is_regular_file(found))
+        throw Error(path_, "expected the name of an output file, found a device or a pipe");
     // Two processes that write the same file must not share a temporary one: the process id tells them apart.
     const fs::path name = "." + target.stem().string() + "." + std::to_string(::getpid()) + ".partial" +
                           target.extension().string();

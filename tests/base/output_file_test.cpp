@@ -37,6 +37,8 @@ TEST(OutputFile, UncommittedLeavesNothingAndKeepsTheOldFile) {
     EXPECT_EQ(folder.entries(), 1);
 }
 
+TEST(OutputFile, DoesNotReplaceADevice) { EXPECT_THROW(OutputFile("/dev/null"), Error); }
+
 TEST(OutputFile, MissingFolderIsAnErrorThatNamesTheFile) {
     const TemporaryFolder folder;
     try {
