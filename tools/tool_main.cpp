@@ -2,6 +2,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <new>
@@ -57,6 +58,15 @@ int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& ru
     } catch (const std::exception& error) {
         return fail(app, std::string("internal error: ") + error.what());
     }
+}
+
+void checkOutputName(const std::string& output, const std::vector<std::string>& inputs) {
+    if (std::filesystem::path(output).extension() != ".exr")
+        throw CLI::ValidationError("--output", "expected a name that ends with .exr, found '" + output + "'");
+    std::error_code ignored;
+    for (const std::string& input : inputs)
+        if (std::filesystem::equivalent(input, output, ignored))
+            throw CLI::ValidationError("--output", "expected another file than the input '" + input + "'");
 }
 
 }  // namespace vlx

@@ -28,6 +28,10 @@ enum ExitCode : int {
 ///     }
 int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run);
 
+/// Throws CLI::ValidationError (exit 2) unless `output` ends with .exr and is another file than each of
+/// `inputs`: what would otherwise cost the input, or be found out after hours of work.
+void checkOutputName(const std::string& output, const std::vector<std::string>& inputs);
+
 /// Binds an option whose value is one of a few names. Anything else is bad usage, with the names listed.
 template <class Enum>
 CLI::Option* addChoice(CLI::App& app, const std::string& flag, Enum& value,

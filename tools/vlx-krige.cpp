@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <optional>
 #include <string>
 
 #include "progress_bar.h"
@@ -26,7 +27,6 @@ struct Options {
     bool noColourDistance = false;
     bool wholeImage = false;
     bool diagnostics = false;
-    bool half = false;
     bool json = false;
     bool quiet = false;
     int threads = 0;
@@ -57,7 +57,6 @@ void bind(CLI::App& app, Options& o) {
         "--diagnostics", o.diagnostics,
         "paper: also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) "
         "and OUTPUT.json with everything about each region");
-    app.add_flag("--half", o.half, "Write 16-bit channels");
     app.add_flag("--json", o.json, "Print the report as JSON on standard output");
     app.add_flag("-q,--quiet", o.quiet, "Print nothing but errors");
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
@@ -92,13 +91,11 @@ vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
     return result;
 }
 
-void writeText(const std::string& path, const std::string& text) {
-    vlx::OutputFile file(path);
+void writeText(const vlx::OutputFile& file, const std::string& text) {
     std::ofstream stream(file.temporaryPath(), std::ios::binary);
     stream << text;
     stream.close();
-    if (!stream) throw vlx::Error(path, "writing failed");
-    file.commit();
+    if (!stream) throw vlx::Error(file.path(), "writing failed");
 }
 
 int run(Options& o) {
@@ -108,6 +105,8 @@ int run(Options& o) {
         throw CLI::ValidationError(
             "--diagnostics, --no-colour-distance and --whole-image go with --method paper");
 
+    vlx::checkOutputName(o.image, {o.dump});
+    { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
     const vlx::ThreadLimit limit(o.threads);
     const vlx::DumpReader dump(o.dump);
     vlx::Reconstruction result = [&] {
@@ -117,10 +116,12 @@ int run(Options& o) {
     if (o.diagnostics) vlx::addDiagnosticLayers(result);
 
     vlx::ImageWriteOptions write;
-    write.half = o.half;
     write.attributes["Software"] = "vlx-krige";
+    // Both files or none: the image gets its name only when the JSON is complete.
+    std::optional<vlx::OutputFile> diagnostics;
+    if (o.diagnostics) writeText(diagnostics.emplace(o.image + ".json"), vlx::toJson(result));
     vlx::writeImage(o.image, result.image, write);
-    if (o.diagnostics) writeText(o.image + ".json", vlx::toJson(result));
+    if (diagnostics) diagnostics->commit();
 
     if (o.json)
         std::printf("%s\n", vlx::toJson(result.report).c_str());

@@ -78,6 +78,7 @@ struct StackCommand {
                 throw CLI::ValidationError("--map", "expected NAME=SOURCE, found '" + mapping + "'");
             options.map[mapping.substr(0, sign)] = mapping.substr(sign + 1);
         }
+        vlx::checkOutputName(dump, images);
         vlx::StackReport report;
         {
             vlx::ProgressBar bar("stacking");
@@ -117,6 +118,7 @@ struct SampleCommand {
     }
 
     int run() const {
+        vlx::checkOutputName(dump, {image});
         vlx::sampleAtPoints(image, dump, options);
         return vlx::kDone;
     }

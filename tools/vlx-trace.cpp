@@ -1,6 +1,7 @@
 // vlx-trace: traces a glTF scene into a dump of samples.
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -98,6 +99,9 @@ struct TraceCommand {
 
     int run() {
         if (dump.empty() && !listCameras) throw CLI::RequiredError("--output");
+        if (!listCameras) vlx::checkOutputName(dump, {scene});
+        for (const float value : environmentConstant)
+            if (!std::isfinite(value)) throw CLI::ValidationError("--env-constant", "expected finite values");
         if (environmentConstant.size() == 3)
             environment.constant =
                 Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};

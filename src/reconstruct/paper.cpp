@@ -206,10 +206,13 @@ void store(const RegionEstimate& estimate, int radiance, Image& image) {
     }
 }
 
-std::int64_t emptyPixels(const SampleBand& band) {
-    std::int64_t empty = 0;
-    for (std::size_t p = 0; p < band.pixels(); ++p) empty += band.offsets[p] == band.offsets[p + 1] ? 1 : 0;
-    return empty;
+/// Pixels of a region without a usable sample.
+std::int64_t emptyPixels(const RegionData& data) {
+    std::vector<bool> filled(static_cast<std::size_t>(data.pixels.pixels()));
+    for (Eigen::Index i = 0; i < data.size(); ++i)
+        filled[static_cast<std::size_t>(pixelOf(data.pixels, data.positions(i, 0), data.positions(i, 1)))] =
+            true;
+    return std::count(filled.begin(), filled.end(), false);
 }
 
 }  // namespace
@@ -235,7 +238,8 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     const Moments moments(data);
     diagnostics.errorVariance = moments.errors.dot(data.counts) / data.size();
     const bool equal = (data.means.rowwise() - data.means.row(0)).cwiseAbs().maxCoeff() == 0;
-    if (equal && diagnostics.errorVariance == 0) {
+    if (equal && diagnostics.errorVariance == 0 &&
+        data.samples > 1) {  // one sample equals itself, and proves nothing
         useMean(estimate, data, moments, RegionOutcome::AllEqual);
         return estimate;
     }
@@ -303,7 +307,7 @@ Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& opti
             whole ? std::vector<Window>{header.data}
                   : regionsOf(Window{band.x, band.y, band.width, band.height}, options.regionSize);
         std::vector<RegionDiagnostics> diagnostics(regions.size());
-        std::vector<std::int64_t> dropped(regions.size());
+        std::vector<std::int64_t> dropped(regions.size()), empty(regions.size());
         parallelFor(0, static_cast<std::int64_t>(regions.size()), [&](std::int64_t i) {
             const auto index = static_cast<std::size_t>(i);
             const RegionData data = gatherRegion(band, channels.layout, regions[index], kCellsPerPixel);
@@ -314,13 +318,14 @@ Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& opti
             store(estimate, radiance, result.image);
             diagnostics[index] = estimate.diagnostics;
             dropped[index] = data.dropped;
+            empty[index] = emptyPixels(data);
         });
         for (std::size_t i = 0; i < regions.size(); ++i) {
             ++result.report.regions[static_cast<std::size_t>(diagnostics[i].outcome)];
             result.report.droppedSamples += dropped[i];
+            result.report.emptyPixels += empty[i];
             result.report.jitteredSystems += diagnostics[i].jitter > 0 ? 1 : 0;
         }
-        result.report.emptyPixels += emptyPixels(band);
         result.regions.insert(result.regions.end(), diagnostics.begin(), diagnostics.end());
     };
     forEachBand(dump, channels, options.regionSize, result.report, progress, reconstructBand);

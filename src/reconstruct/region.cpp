@@ -152,20 +152,19 @@ RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const 
                 for (Eigen::Index c = 0; c < channels; ++c)
                     z[c] = static_cast<double>(band.values[static_cast<std::size_t>(
                         layout.radiance[static_cast<std::size_t>(c)])][s]);
-                int cx = 0, cy = 0;
-                bool usable = z.isFinite().all();
-                if (positioned && usable) {
+                if (!z.head(std::min<Eigen::Index>(3, channels)).isFinite().all()) {
+                    ++data.dropped;
+                    continue;
+                }
+                z = z.isFinite().select(z, 0.0);  // a bad alpha does not cost the radiance
+                int cx = cells / 2, cy = cx;
+                if (positioned) {
                     const auto px = static_cast<double>(band.values[static_cast<std::size_t>(layout.x)][s]);
                     const auto py = static_cast<double>(band.values[static_cast<std::size_t>(layout.y)][s]);
-                    usable = std::isfinite(px) && std::isfinite(py);
-                    if (usable) {
+                    if (std::isfinite(px) && std::isfinite(py)) {
                         cx = cellAlong(px, column, cells);
                         cy = cellAlong(py, row, cells);
                     }
-                }
-                if (!usable) {
-                    ++data.dropped;
-                    continue;
                 }
                 if (data.samples++ == 0) reference = z;
                 z -= reference;

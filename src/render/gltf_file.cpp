@@ -1,6 +1,7 @@
 #include "gltf_file.h"
 
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -11,6 +12,9 @@ namespace vlx::render {
 namespace {
 
 std::vector<unsigned char> readBytes(const std::string& path) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(path, ignored))
+        throw Error(path, "expected a glTF file, found no such file");
     std::ifstream in(path, std::ios::binary);
     if (!in) throw Error(path, "cannot be opened");
     std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};

@@ -74,6 +74,8 @@ TEST(VlxKrige, BadUsageIsExitTwo) {
                                                       {kDump, "-o", out, "--region", "8", "--whole-image"},
                                                       {kDump, "-o", out, "--method", "mean", "--diagnostics"},
                                                       {kDump, "-o", out, "--threads", "-1"},
+                                                      {kDump, "-o", folder / "out.png"},
+                                                      {kDump, "-o", kDump},
                                                       {kDump, "-o", out, "--nonsense"}}) {
         const ToolRun run = krige(arguments);
         std::string line;

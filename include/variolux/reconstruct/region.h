@@ -20,23 +20,24 @@ struct RegionData {
     Eigen::MatrixXd errorVariances;  ///< n x c: of the means (below); 0 when unknown
     bool varianceKnown = false;      ///< false when no cell of a pixel or smaller holds two samples
     std::int64_t samples = 0;        ///< usable samples
-    std::int64_t dropped = 0;        ///< samples with a non-finite value in any channel: left out
+    std::int64_t dropped = 0;        ///< samples with a non-finite R, G or B: left out
 
     int size() const { return static_cast<int>(counts.size()); }
 };
 
 /// Which channels of a band hold what. Positions are optional (-1).
 struct BandLayout {
-    std::vector<int>
-        radiance;  ///< channel indices of R, G, B and others to reconstruct with the same weights
-    int x = -1;    ///< sample.x
-    int y = -1;    ///< sample.y
+    /// Channel indices of R, G, B and others to reconstruct with the same weights.
+    std::vector<int> radiance;
+    int x = -1;  ///< sample.x
+    int y = -1;  ///< sample.y
 };
 
 /// Gathers the samples of the pixels `region`, which must lie within the band.
 ///
 /// A sample belongs to the cell of its own pixel that its position falls in; positions outside the pixel (a
-/// wide pixel filter) go to the nearest cell of the pixel.
+/// wide pixel filter) go to the nearest cell of the pixel, positions that are not finite to its centre. A
+/// channel beyond the first three that is not finite counts as 0.
 ///
 /// An error variance is that of one sample over the number of samples in the cell. One sample's is the mean
 /// residual variance over the region (METHOD.md section 3): the pooled unbiased variance sum (z - mean of its
