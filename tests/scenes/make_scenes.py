@@ -336,7 +336,8 @@ def depth_of_field():
             x = (i - 1) * (0.62 + 0.12 * row) + 0.15 * (row % 2)
             s.sphere(s.material(colour, roughness=rng.choice((0.15, 0.5, 1))), (x, 0.2, z), 0.2, 12)
     for i in range(6):  # lights far behind the focus become discs
-        s.box(s.material((0, 0, 0), emission=(14, 11, 7)), (-2.4 + 0.9 * i, 0.9 + 0.35 * (i % 2), -4), (0.05, 0.05, 0.05))
+        bulb = s.material((0, 0, 0), emission=(14, 11, 7))
+        s.box(bulb, (-2.4 + 0.9 * i, 0.9 + 0.35 * (i % 2), -4), (0.05, 0.05, 0.05))
     return s
 
 
@@ -407,7 +408,7 @@ def next_door():
 
 
 def noise_free():
-    """Emitters, black background, and a convex thing lit by a point light alone, all without noise, beside a lit corner that has it."""
+    """Emitters, black background, and a panel that a point light lights, without noise, beside a corner that has it."""
     s = Scene()
     s.camera((0, 1.2, 5), (0, 1.0, 0), 36)
     for i, radiance in enumerate(((0.05, 0.05, 0.05), (0.4, 0.1, 0.05), (0.1, 0.5, 0.9), (3, 2.5, 1))):
