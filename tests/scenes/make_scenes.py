@@ -408,7 +408,7 @@ def next_door():
 
 
 def noise_free():
-    """Emitters, black background, and a panel that a point light lights, without noise, beside a corner that has it."""
+    """Emitters and black background, without any noise, beside a panel and a corner that have it."""
     s = Scene()
     s.camera((0, 1.2, 5), (0, 1.0, 0), 36)
     for i, radiance in enumerate(((0.05, 0.05, 0.05), (0.4, 0.1, 0.05), (0.1, 0.5, 0.9), (3, 2.5, 1))):
@@ -416,7 +416,7 @@ def noise_free():
         shine = s.material((0, 0, 0), emission=radiance, specular=0)
         s.quad(shine, (-1.5 + 0.4 * i, 1.75, 0.6), (0.34, 0, 0), (0, 0.5, 0))
     s.quad(s.material((0, 0, 0), specular=0), (-1.5, 1.1, 0.3), (1.2, 0, 0), (0, 0.5, 0))  # black, before black
-    # Only the point light, below, reaches the panel's front: smooth shading, variation inside pixels alone.
+    # Only the point light reaches the panel's front: its noise is that of choosing one light at random.
     s.quad(s.material((0.7, 0.7, 0.7), specular=0), (-1.5, 0.1, 0.0), (1.2, 0, 0), (0, 0.8, 0))
     s.point_light((-0.9, 0.3, 3.0), (7, 7, 7))
     # The noisy corner.
