@@ -416,7 +416,7 @@ def noise_free():
         shine = s.material((0, 0, 0), emission=radiance, specular=0)
         s.quad(shine, (-1.5 + 0.4 * i, 1.75, 0.6), (0.34, 0, 0), (0, 0.5, 0))
     s.quad(s.material((0, 0, 0), specular=0), (-1.5, 1.1, 0.3), (1.2, 0, 0), (0, 0.5, 0))  # black, before black
-    # Only the point light reaches the panel's front: its noise is that of choosing one light at random.
+    # Smooth, under the point light and, at a grazing angle, the lamp: noisy because one light is chosen at random.
     s.quad(s.material((0.7, 0.7, 0.7), specular=0), (-1.5, 0.1, 0.0), (1.2, 0, 0), (0, 0.8, 0))
     s.point_light((-0.9, 0.3, 3.0), (7, 7, 7))
     # The noisy corner.
