@@ -11,17 +11,20 @@
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
 #include "variolux/compare/gaussian.h"
+#include "variolux/reconstruct/drift_kriging.h"
 #include "variolux/reconstruct/mean.h"
 #include "variolux/reconstruct/paper.h"
 
 namespace {
 
-enum class Method { Paper, Mean, Gaussian };
+enum class Method { Krige, Paper, Mean, Gaussian };
 
 struct Options {
     std::string dump;
     std::string image;
-    Method method = Method::Paper;
+    Method method = Method::Krige;
+    vlx::DriftKrigingOptions krige;
+    bool noFeatures = false;
     double sigma = 1;
     vlx::PaperOptions paper;
     bool noColourDistance = false;
@@ -39,9 +42,38 @@ void bind(CLI::App& app, Options& o) {
                    "deviation of the error of R, G, B)")
         ->required();
     vlx::addChoice(app, "--method", o.method,
-                   {{"paper", Method::Paper}, {"mean", Method::Mean}, {"gaussian", Method::Gaussian}},
-                   "paper: kriging by region (Yue and Nishita); mean: plain average of each pixel's samples; "
+                   {{"krige", Method::Krige},
+                    {"paper", Method::Paper},
+                    {"mean", Method::Mean},
+                    {"gaussian", Method::Gaussian}},
+                   "krige: kriging with the features as external drift, in overlapping neighbourhoods; paper: "
+                   "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples; "
                    "gaussian: the average, Gaussian filtered (no layer stddev)");
+    vlx::addChoice(app, "--quality", o.krige.quality,
+                   {{"draft", vlx::Quality::Draft},
+                    {"standard", vlx::Quality::Standard},
+                    {"high", vlx::Quality::High}},
+                   "krige: draft: one model, sparse neighbourhoods; standard: three models; high: neighbourhoods "
+                   "twice as dense along each axis");
+    vlx::addChoice(app, "--fireflies", o.krige.fireflies,
+                   {{"keep", vlx::Fireflies::Keep},
+                    {"robust", vlx::Fireflies::Robust},
+                    {"clamp", vlx::Fireflies::Clamp}},
+                   "krige: samples far brighter than all around. keep: unbiased and noisy; robust: the brightest "
+                   "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
+                   "What was removed is reported");
+    app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--strength", o.krige.strength, "krige: 0 keeps the plain average, 1 takes the estimate")
+        ->check(CLI::Range(0.0, 1.0))
+        ->capture_default_str();
+    app.add_option("--feature", o.krige.features,
+                   "krige: a further channel of the dump to use as drift, besides albedo, N and Z; repeatable");
+    app.add_option("--radiance", o.krige.radiance,
+                   "krige: a further channel to estimate with the same weights as R, G, B (a light group): parts "
+                   "still add up; repeatable");
+    app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
     app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
@@ -73,6 +105,8 @@ void bind(CLI::App& app, Options& o) {
 vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
                                 const vlx::Progress& progress) {
     switch (o.method) {
+        case Method::Krige:
+            return vlx::reconstructDriftKriging(dump, o.krige, progress);
         case Method::Paper:
             return vlx::reconstructPaper(dump, o.paper, progress);
         case Method::Mean:
@@ -101,6 +135,7 @@ void writeText(const vlx::OutputFile& file, const std::string& text) {
 int run(Options& o) {
     o.paper.colourDistance = !o.noColourDistance;
     if (o.wholeImage) o.paper.regionSize = 0;
+    o.krige.standardFeatures = !o.noFeatures;
     if (o.method != Method::Paper && (o.diagnostics || o.noColourDistance || o.wholeImage))
         throw CLI::ValidationError(
             "--diagnostics, --no-colour-distance and --whole-image go with --method paper");

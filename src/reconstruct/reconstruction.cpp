@@ -14,9 +14,19 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
             report.regions[static_cast<std::size_t>(i)];
     return {{"samples", report.samples},
             {"droppedSamples", report.droppedSamples},
+            {"limitedSamples", report.limitedSamples},
+            {"energyRemoved", report.energyRemoved},
             {"emptyPixels", report.emptyPixels},
+            {"exactPixels", report.exactPixels},
             {"regions", regions},
             {"jitteredSystems", report.jitteredSystems},
+            {"neighbourhoods", report.neighbourhoods},
+            {"ownNeighbourhoods", report.ownNeighbourhoods},
+            {"failedNeighbourhoods", report.failedNeighbourhoods},
+            {"driftFunctions", report.neighbourhoods > 0
+                                   ? report.driftFunctions / static_cast<double>(report.neighbourhoods)
+                                   : 0},
+            {"seconds", report.seconds},
             {"readSeconds", report.readSeconds},
             {"solveSeconds", report.solveSeconds}};
 }
@@ -57,6 +67,15 @@ std::string toText(const ReconstructionReport& report) {
         first = false;
     }
     if (!first) text << "\n";
+    if (report.limitedSamples > 0)
+        text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
+             << " % of the light removed\n";
+    if (report.neighbourhoods > 0)
+        text << report.neighbourhoods << " neighbourhoods kriged, "
+             << report.driftFunctions / static_cast<double>(report.neighbourhoods)
+             << " drift functions on average\n";
+    if (report.failedNeighbourhoods > 0)
+        text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
     if (report.jitteredSystems > 0) text << report.jitteredSystems << " systems needed jitter\n";
     return text.str();
 }

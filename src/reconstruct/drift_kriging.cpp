@@ -1,0 +1,524 @@
+#include "variolux/reconstruct/drift_kriging.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "neighbourhoods.h"
+#include "pixel_statistics.h"
+#include "prefilter.h"
+#include "stacking.h"
+#include "variolux/base/error.h"
+#include "variolux/base/parallel.h"
+#include "variolux/geostat/random_drift.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr int kReadRows = 16;
+constexpr int kFireflyReach = 2;   // pixels: the neighbourhood of a firefly is 5 x 5 pixels
+constexpr int kStackReach = 10;    // pixels: triangular window of 21 x 21 pixels
+constexpr double kMeanSignificance = 2;  // standard errors by which the plain mean must improve
+// Rows kept of everything: a tile row, and all that its stages look ahead and back, rounded up.
+constexpr int kRowsKept = 192;
+
+struct QualityModels {
+    std::vector<NeighbourhoodModel> models;
+    int stride;
+};
+
+QualityModels modelsOf(Quality quality) {
+    const std::vector<NeighbourhoodModel> three = {{13, 2.f}, {5, 1.f}, {8, 0.7f}};
+    switch (quality) {
+        case Quality::Draft:
+            return {{{8, 1.f}}, 6};
+        case Quality::Standard:
+            return {three, 4};
+        case Quality::High:
+            return {three, 2};
+    }
+    return {three, 4};
+}
+
+class Stopwatch {
+  public:
+    /// Adds the time since the last call (or construction) to `seconds`.
+    void addTo(double& seconds) {
+        const auto now = std::chrono::steady_clock::now();
+        seconds += std::chrono::duration<double>(now - last_).count();
+        last_ = now;
+    }
+
+  private:
+    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// The stages of the reconstruction, each a ring of rows that is filled just ahead of what the next one needs.
+class Pipeline {
+  public:
+    Pipeline(const DumpReader& dump, const DriftKrigingOptions& options, const Progress& progress)
+        : dump_(dump),
+          options_(options),
+          progress_(progress),
+          layout_(chooseSampleLayout(dump, options)),
+          planes_(layout_),
+          quality_(modelsOf(options.quality)),
+          width_(dump.header().data.width),
+          height_(dump.header().data.height),
+          radiance_(layout_.radiance),
+          gathered_(width_, planes_.channels, kRowsKept),
+          data_(width_, 2 * radiance_ + 3, kRowsKept),
+          squares_(width_, 4, kRowsKept),
+          features_(width_, 2 * layout_.features, kRowsKept),
+          variances_(width_, 3, kRowsKept) {
+        if (layout_.features + 5 > kMaxRandomDrift || radiance_ > kMaxRandomDrift)
+            throw Error(dump.path(), "expected at most " + std::to_string(kMaxRandomDrift - 5) +
+                                         " features and " + std::to_string(kMaxRandomDrift) +
+                                         " radiance channels, found " + std::to_string(layout_.features) +
+                                         " and " + std::to_string(radiance_));
+        const EstimatePlanes planes{radiance_};
+        for (std::size_t m = 0; m < quality_.models.size(); ++m) {
+            sums_.emplace_back(width_, planes.channels(), kRowsKept);
+            estimates_.emplace_back(width_, 2 * radiance_ + 3, kRowsKept);
+        }
+        const int candidates = static_cast<int>(quality_.models.size());  // models but one, and the mean
+        momentPlanes_ = candidates * (candidates + 1) / 2 + 2 * candidates;
+        moments_ = RowRing(width_, momentPlanes_, kRowsKept);
+        std::vector<std::string> channels(layout_.names.begin(), layout_.names.begin() + radiance_);
+        for (const char* name : {"stddev.R", "stddev.G", "stddev.B"}) channels.emplace_back(name);
+        result_.image = Image(dump.header().data, std::move(channels));
+        result_.image.display = dump.header().display;
+    }
+
+    Reconstruction run() {
+        for (int y = 0; y < height_; y += kTile) {
+            combine(std::min(height_, y + kTile));
+            if (progress_) progress_(std::min(height_, y + kTile), height_);
+        }
+        ReconstructionReport& report = result_.report;
+        for (const auto& [stage, seconds] : report.seconds)
+            (stage == "read" ? report.readSeconds : report.solveSeconds) += seconds;
+        return std::move(result_);
+    }
+
+  private:
+    // Each stage fills rows up to (not including) `until`, cut to the image, after the stages that it needs.
+
+    void gather(int until) {
+        until = std::min(until, height_);
+        while (gatheredRows_ < until) {
+            const int first = gatheredRows_, rows = std::min(kReadRows, height_ - first);
+            const SampleBand band = dump_.read(dump_.header().data.y + first, rows, layout_.names);
+            watch_.addTo(result_.report.seconds["read"]);
+            std::vector<GatherCounts> counts(static_cast<std::size_t>(rows));
+            const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;
+            parallelFor(0, rows, [&](std::int64_t row) {
+                counts[static_cast<std::size_t>(row)] =
+                    gatherRow(band, layout_, planes_, static_cast<int>(row), clamp, gathered_,
+                              first + static_cast<int>(row));
+            });
+            ReconstructionReport& report = result_.report;
+            for (const GatherCounts& of : counts) {
+                report.samples += of.samples;
+                report.droppedSamples += of.dropped;
+                report.emptyPixels += of.empty;
+                report.limitedSamples += of.limited;
+                luminance_ += of.luminance;
+                removed_ += of.removed;
+            }
+            gatheredRows_ += rows;
+            watch_.addTo(report.seconds["statistics"]);
+        }
+    }
+
+    /// Means of the halves without fireflies, sums of squares, and their degrees of freedom.
+    void limit(int until) {
+        until = std::min(until, height_);
+        if (dataRows_ >= until) return;
+        gather(until + kFireflyReach);
+        const int first = dataRows_;
+        struct Removed {
+            std::int64_t samples = 0;
+            double luminance = 0;
+        };
+        std::vector<Removed> removed(static_cast<std::size_t>(until - first));
+        parallelFor(first, until, [&](std::int64_t line) {
+            const int y = static_cast<int>(line);
+            Removed& of = removed[static_cast<std::size_t>(y - first)];
+            for (int x = 0; x < width_; ++x) limitPixel(x, y, of.samples, of.luminance);
+        });
+        for (const Removed& of : removed) {
+            result_.report.limitedSamples += of.samples;
+            removed_ += of.luminance;
+        }
+        result_.report.energyRemoved = luminance_ > 0 ? removed_ / luminance_ : 0;
+        dataRows_ = until;
+        watch_.addTo(result_.report.seconds["statistics"]);
+    }
+
+    void limitPixel(int x, int y, std::int64_t& samples, double& luminance) {
+        const auto raw = [&](int plane) { return gathered_.row(plane, y)[x]; };
+        const float nA = raw(planes_.countA), nB = raw(planes_.countB);
+        const float n = raw(planes_.count);
+        const bool single = n == 1;
+        data_.row(2 * radiance_ + 2, y)[x] = n;
+        data_.row(2 * radiance_, y)[x] = nA;
+        data_.row(2 * radiance_ + 1, y)[x] = nB;
+        for (int c = 0; c < radiance_; ++c) {
+            data_.row(c, y)[x] = raw(planes_.meanA + c);
+            data_.row(radiance_ + c, y)[x] = raw(planes_.meanB + c);
+        }
+        float squares[3];
+        for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares + c);
+
+        const float brightest = raw(planes_.brightestLuminance);
+        if (options_.fireflies == Fireflies::Robust && brightest > 0) {
+            const float most = secondBrightest(x, y);
+            if (brightest > most) {
+                const float change = most / brightest - 1;  // of every radiance channel of that sample
+                const int half = raw(planes_.brightestHalf) > 0 ? 1 : 0;
+                const float halfCount = half == 0 ? nA : nB;
+                for (int c = 0; c < radiance_; ++c) {
+                    if (c == layout_.alpha) continue;
+                    const float old = raw(planes_.brightest + c), step = change * old;
+                    if (c < 3) {
+                        const float mean =
+                            (data_.row(c, y)[x] * nA + data_.row(radiance_ + c, y)[x] * nB) / (nA + nB);
+                        squares[c] = std::max(
+                            0.f, squares[c] + step * (2 * old + step - 2 * mean) - step * step / n);
+                    }
+                    if (half == 0 || single) data_.row(c, y)[x] += step / halfCount;
+                    if (half == 1 || single) data_.row(radiance_ + c, y)[x] += step / halfCount;
+                }
+                ++samples;
+                luminance += static_cast<double>(brightest - most);
+            }
+        }
+        float freedom = std::max(0.f, n - 1);
+        if (n == 1) borrowSquares(x, y, squares, freedom);
+        for (int c = 0; c < 3; ++c) squares_.row(c, y)[x] = squares[c];
+        squares_.row(3, y)[x] = freedom;
+    }
+
+    /// The second largest luminance of a sample within kFireflyReach.
+    float secondBrightest(int x, int y) const {
+        float most = 0, second = 0;
+        for (int row = std::max(0, y - kFireflyReach); row <= std::min(height_ - 1, y + kFireflyReach); ++row)
+            for (int col = std::max(0, x - kFireflyReach); col <= std::min(width_ - 1, x + kFireflyReach); ++col)
+                for (const int plane : {planes_.brightestLuminance, planes_.secondLuminance}) {
+                    const float l = gathered_.row(plane, row)[col];
+                    if (l > most) {
+                        second = most;
+                        most = l;
+                    } else {
+                        second = std::max(second, l);
+                    }
+                }
+        return second;
+    }
+
+    /// A pixel of one sample has no variance of its own: half the mean squared difference from its four
+    /// neighbours stands in, with so little weight that it counts only where no pixel around has better.
+    void borrowSquares(int x, int y, float* squares, float& freedom) const {
+        constexpr float kFreedom = 1e-3f;
+        float sum[3] = {};
+        int pairs = 0;
+        for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+            if (x + dx < 0 || x + dx >= width_ || y + dy < 0 || y + dy >= height_) continue;
+            if (gathered_.row(planes_.countA, y + dy)[x + dx] == 0) continue;
+            ++pairs;
+            for (int c = 0; c < 3; ++c) {
+                const float d = gathered_.row(planes_.meanA + c, y)[x] -
+                                gathered_.row(planes_.meanA + c, y + dy)[x + dx];
+                sum[c] += 0.5f * d * d;
+            }
+        }
+        if (pairs == 0) return;
+        for (int c = 0; c < 3; ++c) squares[c] = kFreedom * sum[c] / static_cast<float>(pairs);
+        freedom = kFreedom;
+    }
+
+    void prefilter(int until) {
+        until = std::min(until, height_);
+        while (featureRows_ < until) {
+            limit(featureRows_ + kTile + kTileMargin);
+            const int y = featureRows_;
+            parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
+                prefilterFeatures(gathered_, layout_, planes_, static_cast<int>(tile) * kTile, y, width_,
+                                  height_, features_);
+            });
+            featureRows_ = std::min(height_, featureRows_ + kTile);
+            watch_.addTo(result_.report.seconds["features"]);
+        }
+    }
+
+    void smooth(int until) {
+        until = std::min(until, height_);
+        if (varianceRows_ >= until) return;
+        prefilter(until + kVarianceReach);
+        limit(until + kVarianceReach);
+        parallelFor(varianceRows_, until, [&](std::int64_t y) {
+            smoothVariances(squares_, features_, layout_.features, static_cast<int>(y), width_, height_,
+                            variances_);
+        });
+        varianceRows_ = until;
+        watch_.addTo(result_.report.seconds["variances"]);
+    }
+
+    /// Neighbourhoods centred in rows up to `until`.
+    void krige(int until) {
+        until = std::min(until, height_);
+        while (krigedRows_ < until) {
+            const int y = krigedRows_;
+            smooth(y + kTile + kTileMargin);
+            TileInput input{&data_, &features_, &variances_,
+                            {radiance_, 0, radiance_, 2 * radiance_, 2 * radiance_ + 1},
+                            layout_.features, layout_.group, layout_.groups, width_, height_,
+                            quality_.stride};
+            // Rows that this tile row is the first to reach.
+            for (RowRing& ring : sums_)
+                for (int row = std::max(0, y == 0 ? 0 : y + kMaxReach);
+                     row < std::min(height_, y + kTile + kMaxReach); ++row)
+                    std::fill_n(ring.row(0, row), width_ * ring.channels(), 0.f);
+            const int tiles = (width_ + kTile - 1) / kTile;
+            std::vector<NeighbourhoodCounts> counts(static_cast<std::size_t>(tiles));
+            for (int phase = 0; phase < 2; ++phase)  // tiles of one phase do not reach each other's pixels
+                parallelFor(0, (tiles + 1 - phase) / 2, [&](std::int64_t i) {
+                    const int tile = 2 * static_cast<int>(i) + phase;
+                    counts[static_cast<std::size_t>(tile)] =
+                        krigeTile(input, quality_.models, tile * kTile, y, sums_);
+                });
+            ReconstructionReport& report = result_.report;
+            for (const NeighbourhoodCounts& of : counts) {
+                report.neighbourhoods += of.neighbourhoods;
+                report.ownNeighbourhoods += of.own;
+                report.failedNeighbourhoods += of.failed;
+                report.driftFunctions += of.effective;
+            }
+            krigedRows_ = std::min(height_, krigedRows_ + kTile);
+            watch_.addTo(report.seconds["kriging"]);
+        }
+    }
+
+    /// Estimates of the halves and spread of each model, and the moments of stacking.
+    void finish(int until) {
+        until = std::min(until, height_);
+        if (finishedRows_ >= until) return;
+        krige(until + kMaxReach);
+        parallelFor(finishedRows_, until, [&](std::int64_t y) {
+            for (std::size_t m = 0; m < quality_.models.size(); ++m) finishRow(m, static_cast<int>(y));
+            momentsRow(static_cast<int>(y));
+        });
+        finishedRows_ = until;
+        watch_.addTo(result_.report.seconds["combining"]);
+    }
+
+    void finishRow(std::size_t m, int y) {
+        const EstimatePlanes planes{radiance_};
+        const DataPlanes data{radiance_, 0, radiance_, 2 * radiance_, 2 * radiance_ + 1};
+        for (int x = 0; x < width_; ++x) {
+            double spread[3] = {};
+            for (int half = 0; half < 2; ++half) {
+                const int first = half * planes.perHalf();
+                // A half without data here takes the other's estimate.
+                int from = first;
+                if (sums_[m].row(first, y)[x] <= 0) from = planes.perHalf() - first;
+                const double weight = sums_[m].row(from, y)[x];
+                for (int c = 0; c < radiance_; ++c) {
+                    const double shift = weight > 0 ? sums_[m].row(from + planes.sum(c), y)[x] / weight : 0;
+                    estimates_[m].row(half * radiance_ + c, y)[x] =
+                        static_cast<float>(reference(data_, data, c, x, y) + shift);
+                    if (c < 3 && weight > 0)
+                        spread[c] += std::max(
+                            0.0, sums_[m].row(from + planes.square(c), y)[x] / weight - shift * shift);
+                }
+            }
+            for (int c = 0; c < 3; ++c)
+                estimates_[m].row(2 * radiance_ + c, y)[x] = static_cast<float>(spread[c] / 2);
+        }
+    }
+
+    int candidates() const { return static_cast<int>(quality_.models.size()); }
+
+    /// Estimate of a half by model `j`; the last candidate is the half's plain mean.
+    float estimate(int j, int half, int c, int x, int y) const {
+        return j == candidates() ? data_.row(half * radiance_ + c, y)[x]
+                                 : estimates_[static_cast<std::size_t>(j)].row(half * radiance_ + c, y)[x];
+    }
+
+    /// Variance of the mean of half of a pixel's samples, averaged over colours; never 0.
+    double halfVariance(int x, int y) const {
+        double variance = 0, level = 0;
+        const float n = data_.row(2 * radiance_ + 2, y)[x];
+        for (int c = 0; c < 3; ++c) {
+            variance += 2 * variances_.row(c, y)[x] / std::max(1.f, n) / 3;
+            const double value = estimate(0, 0, c, x, y);
+            level += value * value;
+        }
+        return variance + 1e-8 * level + 1e-12;
+    }
+
+    void momentsRow(int y) {
+        const int m = candidates();
+        std::vector<double> sums(static_cast<std::size_t>(momentPlanes_)), e(static_cast<std::size_t>(m + 1)),
+            squares(static_cast<std::size_t>(m));
+        for (int x = 0; x < width_; ++x) {
+            std::fill(sums.begin(), sums.end(), 0.0);
+            std::fill(squares.begin(), squares.end(), 0.0);
+            const bool usable = data_.row(2 * radiance_, y)[x] > 0 && data_.row(2 * radiance_ + 1, y)[x] > 0;
+            const double unit = 1 / halfVariance(x, y);
+            for (int c = 0; usable && c < 3; ++c)
+                for (int half = 0; half < 2; ++half) {
+                    const double base = estimate(0, half, c, x, y);
+                    const double other = data_.row((1 - half) * radiance_ + c, y)[x] - base;
+                    for (int j = 1; j <= m; ++j)
+                        e[static_cast<std::size_t>(j)] = estimate(j, half, c, x, y) - base;
+                    std::size_t at = 0;
+                    for (int i = 1; i <= m; ++i)
+                        for (int j = 1; j <= i; ++j)
+                            sums[at++] += e[static_cast<std::size_t>(i)] * e[static_cast<std::size_t>(j)] * unit;
+                    for (int j = 1; j <= m; ++j) {
+                        const double product = e[static_cast<std::size_t>(j)] * other * unit;
+                        sums[at++] += product;
+                        squares[static_cast<std::size_t>(j - 1)] += product;
+                    }
+                }
+            for (int j = 0; j < m; ++j)
+                sums[sums.size() - static_cast<std::size_t>(m - j)] =
+                    squares[static_cast<std::size_t>(j)] * squares[static_cast<std::size_t>(j)];
+            for (int k = 0; k < momentPlanes_; ++k)
+                moments_.row(k, y)[x] = static_cast<float>(sums[static_cast<std::size_t>(k)]);
+        }
+    }
+
+    void combine(int until) {
+        until = std::min(until, height_);
+        finish(until + kStackReach);
+        std::vector<std::int64_t> exact(static_cast<std::size_t>(until - combinedRows_));
+        parallelFor(combinedRows_, until, [&](std::int64_t y) {
+            exact[static_cast<std::size_t>(y - combinedRows_)] = combineRow(static_cast<int>(y));
+        });
+        for (const std::int64_t of : exact) result_.report.exactPixels += of;
+        combinedRows_ = until;
+        watch_.addTo(result_.report.seconds["combining"]);
+    }
+
+    std::int64_t combineRow(int y) {
+        const int m = candidates();
+        const auto w = static_cast<std::size_t>(width_);
+        // Moments averaged under a triangular window, first over rows.
+        std::vector<double> columns(w * static_cast<std::size_t>(momentPlanes_));
+        for (int row = std::max(0, y - kStackReach); row <= std::min(height_ - 1, y + kStackReach); ++row)
+            for (int k = 0; k < momentPlanes_; ++k) {
+                const double weight = kStackReach + 1 - std::abs(row - y);
+                const float* in = moments_.row(k, row);
+                double* out = columns.data() + static_cast<std::size_t>(k) * w;
+                for (std::size_t i = 0; i < w; ++i) out[i] += weight * in[i];
+            }
+        StackingMoments moments{Eigen::MatrixXd(m, m), Eigen::VectorXd(m), Eigen::VectorXd(m)};
+        Eigen::VectorXd significance = Eigen::VectorXd::Zero(m);
+        significance[m - 1] = kMeanSignificance;
+        std::vector<double> sums(static_cast<std::size_t>(momentPlanes_));
+        constexpr double kUnit = 1.0 / ((kStackReach + 1) * (kStackReach + 1));  // centre weight 1
+        std::int64_t exact = 0;
+        for (int x = 0; x < width_; ++x) {
+            std::fill(sums.begin(), sums.end(), 0.0);
+            for (int col = std::max(0, x - kStackReach); col <= std::min(width_ - 1, x + kStackReach); ++col) {
+                const double weight = (kStackReach + 1 - std::abs(col - x)) * kUnit;
+                for (int k = 0; k < momentPlanes_; ++k)
+                    sums[static_cast<std::size_t>(k)] +=
+                        weight * columns[static_cast<std::size_t>(k) * w + static_cast<std::size_t>(col)];
+            }
+            std::size_t at = 0;
+            for (int i = 0; i < m; ++i)
+                for (int j = 0; j <= i; ++j) moments.products(i, j) = moments.products(j, i) = sums[at++];
+            for (int j = 0; j < m; ++j) moments.agreement[j] = sums[at++];
+            for (int j = 0; j < m; ++j) moments.standardError[j] = std::sqrt(sums[at++]);
+            store(x, y, stackingWeights(moments, significance), exact);
+        }
+        return exact;
+    }
+
+    void store(int x, int y, const Eigen::VectorXd& weights, std::int64_t& exact) {
+        const int m = candidates();
+        float* out = result_.image.at(x, y);
+        const float nA = data_.row(2 * radiance_, y)[x], nB = data_.row(2 * radiance_ + 1, y)[x];
+        const float n = data_.row(2 * radiance_ + 2, y)[x];
+        const bool known = isExact(x, y);
+        exact += known;
+        for (int c = 0; c < radiance_; ++c) {
+            const double mean = n > 0 ? (nA * data_.row(c, y)[x] + nB * data_.row(radiance_ + c, y)[x]) / (nA + nB) : 0;
+            const auto both = [&](int j) {
+                return j == m && n > 0 ? mean
+                                       : 0.5 * (estimate(j, 0, c, x, y) + estimate(j, 1, c, x, y));
+            };
+            const double rest = 1 - weights.sum();
+            double value = rest * both(0);
+            for (int j = 1; j <= m; ++j) value += weights[j - 1] * both(j);
+            const double strength = n > 0 ? options_.strength : 1;
+            const double chosen = known ? mean : value;
+            out[c] = static_cast<float>(mean + strength * (chosen - mean));
+            if (c >= 3) continue;
+            // Within the models, and between them.
+            const double meanVariance = variances_.row(c, y)[x] / std::max(1.f, n);
+            double variance = 0;
+            for (int j = 0; j <= m; ++j) {
+                const double share = j == 0 ? rest : weights[j - 1];
+                const double within =
+                    j == m ? meanVariance : estimates_[static_cast<std::size_t>(j)].row(2 * radiance_ + c, y)[x] / 2;
+                const double d = both(j) - value;
+                variance += share * (within + d * d);
+            }
+            const double s = strength;
+            out[radiance_ + c] = static_cast<float>(
+                known ? 0 : std::sqrt(s * variance + (1 - s) * meanVariance));
+        }
+    }
+
+    bool isExact(int x, int y) const {
+        if (layout_.features == 0 || squares_.row(3, y)[x] < 1) return false;
+        for (int c = 0; c < 3; ++c)
+            if (squares_.row(c, y)[x] > 0) return false;
+        for (int f = 0; f < layout_.features; ++f)
+            if (gathered_.row(planes_.featureError + f, y)[x] > 0) return false;
+        return true;
+    }
+
+    const DumpReader& dump_;
+    const DriftKrigingOptions& options_;
+    const Progress& progress_;
+    SampleLayout layout_;
+    GatheredPlanes planes_;
+    QualityModels quality_;
+    int width_, height_, radiance_, momentPlanes_ = 0;
+    RowRing gathered_;
+    RowRing data_;      // means of A, means of B, counts of A, B, both
+    RowRing squares_;   // sums of squares of R, G, B; their degrees of freedom
+    RowRing features_, variances_;
+    std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: A, B, spread of R, G, B
+    RowRing moments_;
+    int gatheredRows_ = 0, dataRows_ = 0, featureRows_ = 0, varianceRows_ = 0, krigedRows_ = 0,
+        finishedRows_ = 0, combinedRows_ = 0;
+    double luminance_ = 0, removed_ = 0;
+    Stopwatch watch_;
+    Reconstruction result_;
+};
+
+}  // namespace
+
+std::optional<std::string> DriftKrigingOptions::validate() const {
+    if (!(strength >= 0 && strength <= 1))
+        return "expected a strength of 0 to 1, found " + std::to_string(strength);
+    if (fireflies == Fireflies::Clamp && !(clamp > 0 && std::isfinite(clamp)))
+        return "expected a luminance above 0 to clamp at, found " + std::to_string(clamp);
+    return std::nullopt;
+}
+
+Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
+                                       const Progress& progress) {
+    if (const auto broken = options.validate()) throw Error("", *broken);
+    return Pipeline(dump, options, progress).run();
+}
+
+}  // namespace vlx

@@ -1,0 +1,363 @@
+#include "neighbourhoods.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "variolux/geostat/random_drift.h"
+#include "wide.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr int kOffsets = 2 * kMaxReach + 1;
+constexpr int kPositionFunctions = 5;      // x, y, x^2, y^2, xy
+constexpr float kLeastWeight = 0.01f;      // of a datum
+constexpr float kCoveringWeight = 0.05f;   // a pixel less like its regular centres gets its own
+constexpr float kCoveringVariance = 0.25f;  // likewise when they are noisier than it by more than this
+constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
+// Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
+// than their prefilter says. Twice the standard deviation.
+constexpr double kFeatureErrorFactor = 4;
+constexpr int kPriorIterations = 4;
+
+int lanesUp(int n) { return (n + 7) & ~7; }
+
+/// gram[a * rows + b] = sum_i w_i x_a x_b for b <= a. Rows of x are `stride` long, n a multiple of 8 (the rest
+/// zero). Eight partial sums each, added pairwise: the same bits with any vectors.
+VLX_WIDE void weightedGram(const float* x, const float* w, int rows, int stride, int n, float* weighted,
+                           double* gram) {
+    for (int a = 0; a < rows; ++a)
+        for (int i = 0; i < n; ++i) weighted[a * stride + i] = x[a * stride + i] * w[i];
+    const auto total = [](const float* s) {
+        return (static_cast<double>(s[0]) + s[4]) + (static_cast<double>(s[1]) + s[5]) +
+               ((static_cast<double>(s[2]) + s[6]) + (static_cast<double>(s[3]) + s[7]));
+    };
+    for (int a = 0; a < rows; a += 2)
+        for (int b = 0; b <= a; b += 2) {
+            const int a1 = std::min(a + 1, rows - 1), b1 = std::min(b + 1, rows - 1);
+            const float* __restrict xa = weighted + a * stride;
+            const float* __restrict xa1 = weighted + a1 * stride;
+            const float* __restrict xb = x + b * stride;
+            const float* __restrict xb1 = x + b1 * stride;
+            float s00[8] = {}, s01[8] = {}, s10[8] = {}, s11[8] = {};
+            for (int i = 0; i < n; i += 8)
+                for (int k = 0; k < 8; ++k) {
+                    s00[k] += xa[i + k] * xb[i + k];
+                    s01[k] += xa[i + k] * xb1[i + k];
+                    s10[k] += xa1[i + k] * xb[i + k];
+                    s11[k] += xa1[i + k] * xb1[i + k];
+                }
+            gram[a * rows + b] = total(s00);
+            if (b1 <= a) gram[a * rows + b1] = total(s01);
+            gram[a1 * rows + b] = total(s10);
+            gram[a1 * rows + b1] = total(s11);
+        }
+}
+
+/// estimates[i] = offset + sum_j coefficient_j x_j,i
+VLX_WIDE void predictRow(const float* x, const float* coefficients, int functions, int stride, int n,
+                         float offset, float* __restrict estimates) {
+    for (int i = 0; i < n; ++i) estimates[i] = offset;
+    for (int j = 0; j < functions; ++j) {
+        const float b = coefficients[j];
+        if (b == 0) continue;
+        const float* __restrict row = x + j * stride;
+        for (int i = 0; i < n; ++i) estimates[i] += b * row[i];
+    }
+}
+
+VLX_WIDE void addEstimates(const float* __restrict estimates, const float* __restrict references,
+                           const float* __restrict weights, int n, float* __restrict sums,
+                           float* __restrict squares) {
+    for (int i = 0; i < n; ++i) {
+        const float d = estimates[i] - references[i];
+        sums[i] = weights[i] * d;
+        squares[i] = weights[i] * d * d;
+    }
+}
+
+/// One tile's data with their margin, in local planes of kTileSide x kTileSide.
+class Tile {
+  public:
+    Tile(const TileInput& input, int x, int y, int reach) : in_(input), x_(x), y_(y), reach_(reach) {
+        const int c = input.planes.radiance;
+        for (int half = 0; half < 2; ++half) {
+            means_[half].resize(planes(c));
+            counts_[half].resize(planes(1));
+            errors_[half].resize(planes(1));
+            PatchTile& guide = guides_[half];
+            guide.x = x;
+            guide.y = y;
+            guide.channels = 3;
+            guide.value.resize(planes(3));
+            guide.variance.resize(planes(3));
+            for (int k = 0; k < c; ++k)
+                load(*input.data, (half == 0 ? input.planes.meanA : input.planes.meanB) + k,
+                     means_[half].data() + plane(k));
+            load(*input.data, half == 0 ? input.planes.countA : input.planes.countB, counts_[half].data());
+            std::copy_n(means_[half].data(), planes(3), guide.value.data());
+            for (int k = 0; k < 3; ++k) {
+                load(*input.variances, k, guide.variances(k));
+                for (std::size_t i = 0; i < plane(1); ++i) {
+                    guide.variances(k)[i] /= std::max(1.f, counts_[half][i]);
+                    errors_[half][i] += guide.variances(k)[i] / 3;
+                }
+            }
+        }
+        references_.resize(planes(c));
+        for (std::size_t i = 0; i < references_.size(); ++i)
+            references_[i] = std::min(means_[0][i], means_[1][i]);
+        features_.resize(planes(2 * input.featureCount));
+        for (int f = 0; f < 2 * input.featureCount; ++f) load(*input.features, f, features_.data() + plane(f));
+
+        const int side = 2 * reach + 1;
+        std::vector<float> scratch;
+        for (int half = 0; half < 2; ++half) {
+            distances_[half].resize(static_cast<std::size_t>(side * side) * kTile * kTile);
+            for (int dy = -reach; dy <= reach; ++dy)
+                for (int dx = -reach; dx <= reach; ++dx)
+                    patchDistances(guides_[half], dx, dy, 1e-12f, scratch,
+                                   distances_[half].data() + offsetPlane(dx, dy));
+        }
+    }
+
+    NeighbourhoodCounts krige(const NeighbourhoodModel& model, RowRing& estimates) {
+        const EstimatePlanes out{in_.planes.radiance};
+        NeighbourhoodCounts counts;
+        const int right = std::min(kTile, in_.width - x_), bottom = std::min(kTile, in_.height - y_);
+        for (int half = 0; half < 2; ++half) {
+            sums_.assign(planes(out.perHalf()), 0.f);
+            for (int row = 0; row < bottom; ++row)
+                for (int col = 0; col < right; ++col) {
+                    const bool regular = (x_ + col) % in_.stride == 0 && (y_ + row) % in_.stride == 0;
+                    if (!regular && covered(model, half, col, row)) continue;
+                    counts.own += !regular;
+                    krigeCentre(model, half, col, row, counts);
+                }
+            flush(half, model.reach, out, estimates);
+        }
+        return counts;
+    }
+
+  private:
+    static std::size_t plane(int k) { return static_cast<std::size_t>(k) * kTileSide * kTileSide; }
+    static std::size_t planes(int k) { return plane(k); }
+    static int inner(int col, int row) { return (row + kTileMargin) * kTileSide + col + kTileMargin; }
+    std::size_t offsetPlane(int dx, int dy) const {
+        return static_cast<std::size_t>((dy + reach_) * (2 * reach_ + 1) + dx + reach_) * kTile * kTile;
+    }
+    void load(const RowRing& ring, int k, float* out) const {
+        copyTile(ring, k, x_, y_, in_.width, in_.height, out);
+    }
+    float distance(int guide, int col, int row, int dx, int dy) const {
+        return distances_[guide][offsetPlane(dx, dy) + static_cast<std::size_t>(row * kTile + col)];
+    }
+
+    /// Is the pixel like one of the regular centres around it, and not much less noisy?
+    bool covered(const NeighbourhoodModel& model, int half, int col, int row) const {
+        const int left = (x_ + col) % in_.stride, up = (y_ + row) % in_.stride;
+        const float scale = 1 / (model.tolerance * model.tolerance);
+        const auto here = static_cast<std::size_t>(inner(col, row));
+        for (const int dy : {-up, in_.stride - up})
+            for (const int dx : {-left, in_.stride - left}) {
+                if (x_ + col + dx >= in_.width || y_ + row + dy >= in_.height) continue;
+                if (std::max(std::abs(dx), std::abs(dy)) > model.reach) continue;
+                const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
+                const float d = distance(1 - half, col, row, dx, dy) * scale;
+                if (counts_[half][there] > 0 && nearExp(std::max(0.f, d)) > kCoveringWeight &&
+                    errors_[half][here] >= kCoveringVariance * errors_[half][there])
+                    return true;
+            }
+        return false;
+    }
+
+    void krigeCentre(const NeighbourhoodModel& model, int half, int col, int row, NeighbourhoodCounts& counts) {
+        const int reach = model.reach, functions = in_.featureCount + kPositionFunctions;
+        const int channels = in_.planes.radiance, rows = 1 + functions + channels;
+        const int stride = lanesUp((2 * reach + 1) * (2 * reach + 1));
+        const float scale = 1 / (model.tolerance * model.tolerance);
+        const auto centre = static_cast<std::size_t>(inner(col, row));
+
+        index_.clear();
+        weights_.clear();
+        x_values_.resize(static_cast<std::size_t>(rows * stride));
+        float* const places = x_values_.data() + (1 + in_.featureCount) * stride;
+        const float perReach = 1.f / static_cast<float>(reach);
+        const float own = std::max(1.f, counts_[half][centre]);
+        double noise = 0, total = 0;
+        for (int dy = std::max(-reach, -(y_ + row)); dy <= std::min(reach, in_.height - 1 - y_ - row); ++dy)
+            for (int dx = std::max(-reach, -(x_ + col)); dx <= std::min(reach, in_.width - 1 - x_ - col); ++dx) {
+                const float alike = nearExp(std::max(0.f, distance(1 - half, col, row, dx, dy) * scale));
+                if (alike < kLeastWeight) continue;
+                const int at = inner(col + dx, row + dy);
+                const float ratio =
+                    std::min(kMostCountRatio, counts_[half][static_cast<std::size_t>(at)] / own);
+                if (ratio <= 0) continue;
+                const std::size_t i = index_.size();
+                index_.push_back(at);
+                weights_.push_back(alike * ratio);
+                const float px = static_cast<float>(dx) * perReach, py = static_cast<float>(dy) * perReach;
+                float* p = places + i;
+                p[0] = px;
+                p[stride] = py;
+                p[2 * stride] = px * px;
+                p[3 * stride] = py * py;
+                p[4 * stride] = px * py;
+                noise += static_cast<double>(alike * ratio) * errors_[half][static_cast<std::size_t>(at)] * ratio;
+                total += static_cast<double>(alike * ratio);
+            }
+        if (index_.empty()) return;
+        ++counts.neighbourhoods;
+        const auto n = static_cast<int>(index_.size());
+        const int padded = lanesUp(n);
+
+        // Rows of the data: 1, features and position about the centre, radiance about the centre's.
+        float* const constant = x_values_.data();
+        std::fill_n(constant, n, 1.f);
+        std::array<double, kMaxRandomDrift> featureNoise{};
+        for (int f = 0; f < in_.featureCount; ++f) {
+            const float* values = features_.data() + plane(f);
+            const float* errors = features_.data() + plane(in_.featureCount + f);
+            const float about = values[centre];
+            float* x = constant + (1 + f) * stride;
+            double sum = 0;
+            for (int i = 0; i < n; ++i) {
+                const auto at = static_cast<std::size_t>(index_[static_cast<std::size_t>(i)]);
+                x[i] = values[at] - about;
+                sum += static_cast<double>(weights_[static_cast<std::size_t>(i)] * errors[at]);
+            }
+            featureNoise[static_cast<std::size_t>(f)] = sum;
+        }
+        for (int c = 0; c < channels; ++c) {
+            const float* values = means_[half].data() + plane(c);
+            float* x = constant + (1 + functions + c) * stride;
+            for (int i = 0; i < n; ++i)
+                x[i] = values[index_[static_cast<std::size_t>(i)]] - values[centre];
+        }
+        weights_.resize(static_cast<std::size_t>(padded), 0.f);
+        for (int r = 0; r < rows; ++r) std::fill(constant + r * stride + n, constant + r * stride + padded, 0.f);
+        weighted_.resize(x_values_.size());
+        gram_.resize(static_cast<std::size_t>(rows * rows));
+        weightedGram(x_values_.data(), weights_.data(), rows, stride, padded, weighted_.data(), gram_.data());
+
+        // Normal equations about the weighted means, functions standardised; constant ones are left out.
+        const auto gram = [&](int a, int b) {
+            return a >= b ? gram_[static_cast<std::size_t>(a * rows + b)]
+                          : gram_[static_cast<std::size_t>(b * rows + a)];
+        };
+        const auto centred = [&](int a, int b) { return gram(a, b) - gram(a, 0) * gram(b, 0) / total; };
+        double spread = 0, level = 0;
+        for (int c = 0; c < 3; ++c) {
+            const double value = means_[half][plane(c) + centre] + gram(1 + functions + c, 0) / total;
+            spread += std::max(0.0, centred(1 + functions + c, 1 + functions + c)) / total / 3;
+            level += value * value;
+        }
+        const double variance = std::max(noise / total, 1e-10 * level + 1e-20);
+        used_.clear();
+        group_.clear();
+        std::array<double, kMaxRandomDrift> unit{};
+        for (int j = 0; j < functions; ++j) {
+            const double square = centred(1 + j, 1 + j) / total;
+            if (square < (j < in_.featureCount ? 1e-8 : 1e-12)) continue;
+            unit[used_.size()] = 1 / std::sqrt(square);
+            used_.push_back(1 + j);
+            group_.push_back(j < in_.featureCount ? in_.group[static_cast<std::size_t>(j)]
+                                                  : in_.groups + (j - in_.featureCount >= 2));
+        }
+        const auto p = static_cast<Eigen::Index>(used_.size());
+        DriftMoments moments;
+        moments.normal.resize(p, p);
+        moments.right.resize(p, channels);
+        moments.fitted = 3;
+        moments.start = 1 / std::max(spread, variance);
+        for (Eigen::Index a = 0; a < p; ++a) {
+            const auto i = static_cast<std::size_t>(a);
+            for (Eigen::Index b = 0; b <= a; ++b) {
+                const auto j = static_cast<std::size_t>(b);
+                moments.normal(a, b) = moments.normal(b, a) =
+                    centred(used_[i], used_[j]) * unit[i] * unit[j] / variance;
+            }
+            if (used_[i] <= in_.featureCount)
+                moments.normal(a, a) += kFeatureErrorFactor * featureNoise[static_cast<std::size_t>(used_[i] - 1)] *
+                                        unit[i] * unit[i] / variance;
+            for (int c = 0; c < channels; ++c)
+                moments.right(a, c) = centred(used_[i], 1 + functions + c) * unit[i] / variance;
+        }
+        const RandomDrift drift = fitRandomDrift(moments, group_, in_.groups + 2, kPriorIterations);
+        counts.failed += !drift.ok;
+        counts.effective += drift.effective;
+
+        // Predict every pixel of the neighbourhood.
+        const EstimatePlanes out{channels};
+        const auto perNoise = static_cast<float>(1 / variance);
+        for (int i = 0; i < n; ++i) weights_[static_cast<std::size_t>(i)] *= perNoise;
+        scatter(weights_.data(), n, sums_.data() + plane(out.weight()));
+        estimates_.resize(static_cast<std::size_t>(4 * padded));
+        float* const estimate = estimates_.data();
+        float *const about = estimate + padded, *const sum = about + padded, *const square = sum + padded;
+        std::array<float, kMaxRandomDrift> coefficients;
+        for (int c = 0; c < channels; ++c) {
+            double offset = means_[half][plane(c) + centre] + gram(1 + functions + c, 0) / total;
+            coefficients.fill(0);
+            for (Eigen::Index j = 0; j < p; ++j) {
+                const auto i = static_cast<std::size_t>(j);
+                const double b = drift.coefficients(j, c) * unit[i];
+                coefficients[static_cast<std::size_t>(used_[i] - 1)] = static_cast<float>(b);
+                offset -= b * gram(used_[i], 0) / total;
+            }
+            predictRow(constant + stride, coefficients.data(), functions, stride, n, static_cast<float>(offset),
+                       estimate);
+            const float* references = references_.data() + plane(c);
+            for (int i = 0; i < n; ++i) about[i] = references[index_[static_cast<std::size_t>(i)]];
+            addEstimates(estimate, about, weights_.data(), n, sum, square);
+            scatter(sum, n, sums_.data() + plane(out.sum(c)));
+            if (c < 3) scatter(square, n, sums_.data() + plane(out.square(c)));
+        }
+    }
+
+    void scatter(const float* values, int n, float* to) const {
+        for (int i = 0; i < n; ++i) to[index_[static_cast<std::size_t>(i)]] += values[i];
+    }
+
+    void flush(int half, int reach, const EstimatePlanes& out, RowRing& estimates) const {
+        const int left = std::max(0, x_ - reach), right = std::min(in_.width, x_ + kTile + reach);
+        for (int row = std::max(0, y_ - reach); row < std::min(in_.height, y_ + kTile + reach); ++row)
+            for (int k = 0; k < out.perHalf(); ++k) {
+                const float* from = sums_.data() + plane(k) + inner(-x_, row - y_);
+                float* to = estimates.row(half * out.perHalf() + k, row);
+                for (int i = left; i < right; ++i) to[i] += from[i];
+            }
+    }
+
+    const TileInput& in_;
+    int x_, y_, reach_;
+    PatchTile guides_[2];
+    std::vector<float> means_[2], counts_[2], errors_[2], distances_[2], references_, features_;
+
+    // Of the centre at work.
+    std::vector<int> index_, used_, group_;
+    std::vector<float> weights_, x_values_, weighted_, estimates_, sums_;
+    std::vector<double> gram_;
+};
+
+}  // namespace
+
+NeighbourhoodCounts krigeTile(const TileInput& input, const std::vector<NeighbourhoodModel>& models, int x,
+                              int y, std::vector<RowRing>& estimates) {
+    int reach = input.stride;  // pixels are compared with the regular centres around them
+    for (const NeighbourhoodModel& model : models) reach = std::max(reach, model.reach);
+    Tile tile(input, x, y, reach);
+    NeighbourhoodCounts counts;
+    for (std::size_t m = 0; m < models.size(); ++m) {
+        const NeighbourhoodCounts of = tile.krige(models[m], estimates[m]);
+        counts.neighbourhoods += of.neighbourhoods;
+        counts.own += of.own;
+        counts.failed += of.failed;
+        counts.effective += of.effective;
+    }
+    return counts;
+}
+
+}  // namespace vlx

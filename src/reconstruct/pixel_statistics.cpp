@@ -1,0 +1,230 @@
+#include "pixel_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "variolux/base/error.h"
+#include "variolux/base/hash.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr int kScaleRows = 16;
+constexpr double kScalePercentile = 0.99;
+
+void addFeatures(const DumpHeader& header, const std::vector<std::string>& channels, SampleLayout& layout) {
+    for (const std::string& channel : channels)
+        if (findChannel(header, channel) < 0) return;
+    for (const std::string& channel : channels) {
+        layout.names.push_back(channel);
+        layout.group.push_back(layout.groups);
+        layout.scale.push_back(1);
+        ++layout.features;
+    }
+    ++layout.groups;
+}
+
+void requireChannel(const DumpReader& dump, const SampleLayout& layout, const std::string& channel) {
+    if (findChannel(dump.header(), channel) < 0)
+        throw Error(dump.path(), "expected a channel '" + channel + "', found none of that name");
+    if (std::find(layout.names.begin(), layout.names.end(), channel) != layout.names.end())
+        throw Error(dump.path(), "channel '" + channel + "' is used already and cannot be named again");
+}
+
+/// 99th percentiles of the magnitudes of features `first` and on, over rows spread evenly.
+void measureScales(const DumpReader& dump, SampleLayout& layout, std::size_t first) {
+    const std::size_t measured = layout.scale.size() - first;
+    if (measured == 0) return;
+    const std::vector<std::string> channels(
+        layout.names.begin() + layout.radiance + static_cast<std::ptrdiff_t>(first),
+        layout.names.begin() + layout.radiance + layout.features);
+    std::vector<std::vector<float>> magnitudes(measured);
+    const Window& window = dump.header().data;
+    const int rows = std::min(kScaleRows, window.height);
+    for (int i = 0; i < rows; ++i) {
+        const auto row = static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(window.height) / (2 * rows));
+        const SampleBand band = dump.read(window.y + row, 1, channels);
+        for (std::size_t c = 0; c < measured; ++c)
+            for (const float value : band.values[c])
+                if (std::isfinite(value)) magnitudes[c].push_back(std::abs(value));
+    }
+    for (std::size_t c = 0; c < measured; ++c) {
+        std::vector<float>& values = magnitudes[c];
+        if (values.empty()) continue;
+        const auto nth = values.begin() + static_cast<std::ptrdiff_t>(
+                                              kScalePercentile * static_cast<double>(values.size() - 1));
+        std::nth_element(values.begin(), nth, values.end());
+        if (*nth > 0) layout.scale[first + c] = *nth;
+    }
+}
+
+float luminance(const double* rgb) {
+    return static_cast<float>(std::max(0.0, 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]));
+}
+
+}  // namespace
+
+SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOptions& options) {
+    const DumpHeader& header = dump.header();
+    SampleLayout layout;
+    layout.names = {"R", "G", "B"};
+    if (findChannel(header, "A") >= 0) {
+        layout.alpha = static_cast<int>(layout.names.size());
+        layout.names.emplace_back("A");
+    }
+    for (const std::string& channel : options.radiance) {
+        requireChannel(dump, layout, channel);
+        layout.names.push_back(channel);
+    }
+    layout.radiance = static_cast<int>(layout.names.size());
+    if (options.standardFeatures) {
+        addFeatures(header, {"albedo.R", "albedo.G", "albedo.B"}, layout);
+        addFeatures(header, {"N.X", "N.Y", "N.Z"}, layout);
+    }
+    const std::size_t first = layout.scale.size();
+    if (options.standardFeatures) addFeatures(header, {"Z"}, layout);
+    for (const std::string& channel : options.features) {
+        requireChannel(dump, layout, channel);
+        addFeatures(header, {channel}, layout);
+    }
+    measureScales(dump, layout, first);
+    if (findChannel(header, "sample.replicate") >= 0) {
+        layout.replicate = static_cast<int>(layout.names.size());
+        layout.names.emplace_back("sample.replicate");
+    }
+    return layout;
+}
+
+GatheredPlanes::GatheredPlanes(const SampleLayout& layout)
+    : radiance(layout.radiance), features(layout.features) {
+    int next = 0;
+    const auto take = [&](int planes) {
+        const int first = next;
+        next += planes;
+        return first;
+    };
+    count = take(1);
+    countA = take(1);
+    countB = take(1);
+    meanA = take(radiance);
+    meanB = take(radiance);
+    squares = take(3);
+    feature = take(features);
+    featureError = take(features);
+    brightest = take(radiance);
+    brightestLuminance = take(1);
+    secondLuminance = take(1);
+    brightestHalf = take(1);
+    channels = next;
+}
+
+GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
+                       int bandRow, double clamp, RowRing& ring, int y) {
+    GatherCounts counts;
+    const auto radiance = static_cast<std::size_t>(layout.radiance);
+    const auto features = static_cast<std::size_t>(layout.features);
+    std::vector<double> first(radiance + features), sum[2], square(radiance + features);
+    const std::size_t alpha = layout.alpha < 0 ? radiance + features : static_cast<std::size_t>(layout.alpha);
+    std::vector<std::size_t> usable, halves[2];
+    std::vector<std::pair<std::uint64_t, std::size_t>> order;
+    for (int x = 0; x < band.width; ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(bandRow) * static_cast<std::size_t>(band.width) +
+                                  static_cast<std::size_t>(x);
+        usable.clear();
+        for (std::size_t s = band.offsets[pixel]; s < band.offsets[pixel + 1]; ++s) {
+            ++counts.samples;
+            if (std::isfinite(band.values[0][s]) && std::isfinite(band.values[1][s]) &&
+                std::isfinite(band.values[2][s]))
+                usable.push_back(s);
+            else
+                ++counts.dropped;
+        }
+        halves[0].clear();
+        halves[1].clear();
+        if (layout.replicate >= 0)
+            for (const std::size_t s : usable)
+                halves[static_cast<std::uint32_t>(
+                           band.values[static_cast<std::size_t>(layout.replicate)][s]) %
+                       2]
+                    .push_back(s);
+        if (halves[0].empty() || halves[1].empty()) {  // no replicates, or only one
+            order.clear();
+            for (std::size_t i = 0; i < usable.size(); ++i)
+                order.emplace_back(hashOf(x, y, static_cast<std::int64_t>(i)), usable[i]);
+            std::sort(order.begin(), order.end());
+            halves[0].clear();
+            halves[1].clear();
+            for (std::size_t i = 0; i < order.size(); ++i) halves[i % 2].push_back(order[i].second);
+        }
+        const auto n = static_cast<double>(usable.size());
+        if (usable.empty()) ++counts.empty;
+
+        std::fill(square.begin(), square.end(), 0.0);
+        for (auto& s : sum) s.assign(radiance + features, 0.0);
+        double rgb[3] = {};
+        std::size_t bright = 0;
+        float most = -1, second = -1;
+        int brightHalf = 0;
+        const auto value = [&](std::size_t c, std::size_t s) {
+            const auto v = static_cast<double>(band.values[c][s]);
+            return std::isfinite(v) ? v : 0.0;
+        };
+        for (std::size_t c = 0; c < radiance + features; ++c)
+            first[c] = usable.empty() ? 0 : value(c, usable[0]);
+        for (int half = 0; half < 2; ++half)
+            for (const std::size_t s : halves[half]) {
+                for (std::size_t c = 0; c < 3; ++c) rgb[c] = value(c, s);
+                const double brightness = luminance(rgb);
+                const double factor = clamp > 0 && brightness > clamp ? clamp / brightness : 1;
+                counts.luminance += brightness;
+                counts.removed += brightness * (1 - factor);
+                counts.limited += factor < 1;
+                for (std::size_t c = 0; c < radiance + features; ++c) {
+                    const double d = value(c, s) * (c < radiance && c != alpha ? factor : 1) - first[c];
+                    sum[half][c] += d;
+                    square[c] += d * d;
+                }
+                const auto l = static_cast<float>(brightness * factor);
+                if (l > most) {
+                    second = most;
+                    most = l;
+                    bright = s;
+                    brightHalf = half;
+                } else {
+                    second = std::max(second, l);
+                }
+            }
+
+        const auto put = [&](int plane, double v) { ring.row(plane, y)[x] = static_cast<float>(v); };
+        const auto nA = static_cast<double>(halves[0].size());
+        const auto nB = static_cast<double>(halves[1].size());
+        const bool single = usable.size() == 1;
+        put(planes.count, n);
+        put(planes.countA, nA);
+        put(planes.countB, single ? nA : nB);
+        for (std::size_t c = 0; c < radiance; ++c) {
+            const double a = nA > 0 ? first[c] + sum[0][c] / nA : 0;
+            put(planes.meanA + static_cast<int>(c), a);
+            put(planes.meanB + static_cast<int>(c), single ? a : nB > 0 ? first[c] + sum[1][c] / nB : 0);
+        }
+        for (std::size_t c = 0; c < radiance + features; ++c) {
+            const double total = sum[0][c] + sum[1][c];
+            const double squares = n > 0 ? std::max(0.0, square[c] - total * total / n) : 0;
+            if (c < 3) put(planes.squares + static_cast<int>(c), squares);
+            if (c < radiance) continue;
+            const double scale = layout.scale[c - radiance];
+            const int f = static_cast<int>(c - radiance);
+            put(planes.feature + f, n > 0 ? (first[c] + total / n) / scale : 0);
+            put(planes.featureError + f, n > 1 ? squares / (n * (n - 1)) / (scale * scale) : 0);
+        }
+        for (std::size_t c = 0; c < radiance; ++c)
+            put(planes.brightest + static_cast<int>(c), usable.empty() ? 0 : value(c, bright));
+        put(planes.brightestLuminance, std::max(0.f, most));
+        put(planes.secondLuminance, std::max(0.f, second));
+        put(planes.brightestHalf, brightHalf);
+    }
+    return counts;
+}
+
+}  // namespace vlx

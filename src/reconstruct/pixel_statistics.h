@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "row_ring.h"
+#include "variolux/dump/band.h"
+#include "variolux/dump/format.h"
+#include "variolux/dump/reader.h"
+#include "variolux/reconstruct/drift_kriging.h"
+
+/// What the default method knows of a pixel: moments of its samples, gathered in one pass over the dump.
+namespace vlx {
+
+/// The channels of a dump by their roles.
+struct SampleLayout {
+    std::vector<std::string> names;  ///< channels to read, in this order
+    int radiance = 0;                ///< the first ones: R, G, B, then others with the same weights
+    int alpha = -1;                  ///< index of A in `names`: no radiance to limit
+    int features = 0;                ///< the next ones
+    std::vector<int> group;          ///< of each feature; components of one vector share a group
+    std::vector<float> scale;        ///< of each feature: what is stored is feature / scale
+    int groups = 0;
+    int replicate = -1;  ///< index in `names`
+};
+
+/// Finds the roles. Albedo and normals are of order 1 by definition; the scale of depth and of named features
+/// is the 99th percentile of their magnitude in 16 rows spread over the image (the same rows whatever band of
+/// the image is reconstructed). Features that are constant in these rows stay: they cost little. Throws Error
+/// when a named channel is missing or is R, G or B.
+SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOptions& options);
+
+/// Planes of the statistics of rows of pixels, as gathered.
+struct GatheredPlanes {
+    explicit GatheredPlanes(const SampleLayout& layout);
+
+    int radiance, features;
+    // Indices of planes.
+    int count;                  ///< usable samples
+    int countA, countB;         ///< of each half; a single sample counts in both
+    int meanA, meanB;           ///< radiance channels: mean of each half (0 where it has no sample)
+    int squares;                ///< 3: sum of squared deviations of R, G, B from the pixel's mean
+    int feature, featureError;  ///< mean of each feature, and the error variance of that mean
+    int brightest;              ///< radiance channels of the brightest sample
+    int brightestLuminance, secondLuminance, brightestHalf;
+    int channels;
+};
+
+struct GatherCounts {
+    std::int64_t samples = 0, dropped = 0, empty = 0;
+    std::int64_t limited = 0;           ///< samples made darker by the firefly estimator
+    double luminance = 0, removed = 0;  ///< sums over samples
+};
+
+/// Gathers one row (counted from the band's top) into planes of row y.
+///
+/// Halves A and B are the replicates of even and odd number where the dump has replicates, else a random half
+/// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
+/// alike, and may lie on different sides of the pixel. A pixel with one sample has it in both halves. A sample
+/// with a non-finite R, G or B is dropped; other non-finite values count as 0. Sums run in double precision
+/// about the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
+GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
+                       int bandRow, double clamp, RowRing& ring, int y);
+
+}  // namespace vlx

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+
+/// Combining estimates by cross-validation.
+namespace vlx {
+
+/// Second moments of m candidates about a base, summed over pixels and both halves, in units of noise:
+/// e_j the difference of candidate j from the base (both from one half), y that of the other half's data.
+struct StackingMoments {
+    Eigen::MatrixXd products;       ///< m x m: sum e_i e_j
+    Eigen::VectorXd agreement;      ///< m: sum e_j y
+    Eigen::VectorXd standardError;  ///< m: of agreement
+};
+
+/// Weights w >= 0, sum w <= 1 (the base takes the rest), of least sum (y - sum_j w_j e_j)^2 + |w|^2: stacking
+/// with the other half as what is predicted (Breiman, Stacked regressions, 1996). agreement is lowered first by
+/// `significance[j]` standard errors. Coordinate descent, which for a convex problem of this size is exact
+/// enough after 30 rounds.
+Eigen::VectorXd stackingWeights(const StackingMoments& moments, const Eigen::VectorXd& significance);
+
+}  // namespace vlx
