@@ -1,0 +1,704 @@
+#include "variolux/compare/sweep.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "variolux/base/error.h"
+#include "variolux/base/hash.h"
+#include "variolux/base/image_io.h"
+#include "variolux/base/output_file.h"
+#include "variolux/compare/child_process.h"
+#include "variolux/compare/gaussian.h"
+#include "variolux/compare/metrics.h"
+
+namespace vlx {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::uintmax_t kHashedWhole = std::uintmax_t{64} << 20;
+constexpr std::size_t kHashedHead = std::size_t{1} << 20;
+constexpr const char* kStddev = "stddev";
+
+std::uint64_t textHash(std::string_view text, std::uint64_t hash = 0) {
+    for (const char c : text) hash = hashOf(hash, static_cast<unsigned char>(c));
+    return hashOf(hash, static_cast<std::uint64_t>(text.size()));
+}
+
+std::string hex(std::uint64_t value) {
+    char text[17];
+    std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+    return text;
+}
+
+/// What tells a file from another (see runSweep).
+std::string fileIdentity(const std::string& path) {
+    struct stat status {};
+    std::ifstream file(path, std::ios::binary);
+    if (!file || ::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode))
+        throw Error(path, "expected a file that can be read");
+    const auto size = static_cast<std::uintmax_t>(status.st_size);
+    std::string head(size <= kHashedWhole ? size : kHashedHead, '\0');
+    file.read(head.data(), static_cast<std::streamsize>(head.size()));
+    if (!file) throw Error(path, "reading failed");
+    std::uint64_t hash = hashOf(size);
+    for (std::size_t i = 0; i + 8 <= head.size(); i += 8) {
+        std::uint64_t word = 0;
+        std::memcpy(&word, head.data() + i, 8);
+        hash = hashOf(hash, word);
+    }
+    hash = textHash(std::string_view(head).substr(head.size() / 8 * 8), hash);
+    if (size > kHashedWhole) hash = hashOf(hash, status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
+    return hex(hash);
+}
+
+std::string filled(std::string text, const std::map<std::string, std::string>& places) {
+    for (std::size_t at = text.find('{'); at != std::string::npos; at = text.find('{', at)) {
+        const std::size_t end = text.find('}', at);
+        const auto place =
+            end == std::string::npos ? places.end() : places.find(text.substr(at + 1, end - at - 1));
+        if (place == places.end()) {
+            ++at;  // a brace of the shell's
+            continue;
+        }
+        text.replace(at, end - at + 1, place->second);
+        at += place->second.size();
+    }
+    return text;
+}
+
+std::string firstWord(const std::string& command) { return command.substr(0, command.find(' ')); }
+
+std::string numberText(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value);
+    return text;
+}
+
+std::string samplingText(const SweepSampling& sampling) {
+    return sampling.hierarchical ? "tolerance " + numberText(sampling.setting)
+                                 : numberText(sampling.setting) + " spp";
+}
+
+/// The folder's results file: held against other sweeps, read once, then added to.
+class ResultsFile {
+  public:
+    explicit ResultsFile(const std::string& path) : path_(path) {
+        fd_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+        if (fd_ < 0) throw Error(path, std::string("cannot be written: ") + std::strerror(errno));
+        if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+            ::close(fd_);
+            throw Error(path, "another sweep is working in this folder");
+        }
+        std::ifstream file(path, std::ios::binary);
+        std::string line;
+        std::uintmax_t complete = 0;
+        while (std::getline(file, line) && !file.eof()) {  // a line without its end was being written
+            complete += line.size() + 1;
+            const SweepRecord record = parseRecord(line, path);
+            records_[record.key] = record;
+        }
+        if (::ftruncate(fd_, static_cast<off_t>(complete)) != 0 || ::lseek(fd_, 0, SEEK_END) < 0)
+            throw Error(path, std::string("cannot be written: ") + std::strerror(errno));
+    }
+    ~ResultsFile() { ::close(fd_); }
+    ResultsFile(const ResultsFile&) = delete;
+    ResultsFile& operator=(const ResultsFile&) = delete;
+
+    /// The record of this key, if it did not fail.
+    const SweepRecord* find(const std::string& key) const {
+        const auto found = records_.find(key);
+        return found == records_.end() || !found->second.failure.empty() ? nullptr : &found->second;
+    }
+
+    void add(const SweepRecord& record) {
+        const std::string line = toJsonLine(record) + "\n";
+        if (::write(fd_, line.data(), line.size()) != static_cast<ssize_t>(line.size()) || ::fsync(fd_) != 0)
+            throw Error(path_, "writing failed");
+        records_[record.key] = record;
+    }
+
+  private:
+    std::string path_;
+    int fd_;
+    std::map<std::string, SweepRecord> records_;
+};
+
+double loadAverage() {
+    double load = 0;
+    return ::getloadavg(&load, 1) == 1 ? load : kNan;
+}
+
+struct ReferenceImage {
+    Image colour;
+    std::optional<Image> stddev;
+};
+
+/// See SweepMethod, {sigma}.
+double bestSigma(const Image& average, const Image& reference, const std::string& path) {
+    double best = 0, least = std::numeric_limits<double>::infinity();
+    constexpr int kSteps = 24;
+    for (int i = 0; i <= kSteps; ++i) {
+        const double sigma = std::round(200 * std::pow(20.0, static_cast<double>(i) / kSteps)) / 1000;
+        const double error =
+            compareColour(reference, gaussianFilter(average, sigma).image, path)[Metric::RelMse];
+        if (error < least) {
+            least = error;
+            best = sigma;
+        }
+    }
+    if (best == 0) throw Error(path, "expected an average that can be compared with the reference");
+    return best;
+}
+
+/// Pixels to inspect: `count` of an even grid, and a quarter as many where the error is largest in squares of
+/// 8 x 8 pixels (one a square, so that they do not all sit on one firefly).
+std::vector<std::pair<int, int>> inspectedPixels(const Image& error, int count) {
+    const Window& window = error.data;
+    std::vector<std::pair<int, int>> places;
+    const double area = static_cast<double>(window.pixels()) / std::max(count, 1);
+    const int columns = std::max(1, static_cast<int>(std::lround(window.width / std::sqrt(area))));
+    const int rows = std::max(1, count / columns);
+    for (int row = 0; row < rows; ++row)
+        for (int col = 0; col < columns; ++col)
+            places.emplace_back(window.x + (2 * col + 1) * window.width / (2 * columns),
+                                window.y + (2 * row + 1) * window.height / (2 * rows));
+
+    struct Square {
+        float error = -1;
+        int x = 0, y = 0;
+    };
+    constexpr int kSide = 8;
+    const int across = (window.width + kSide - 1) / kSide;
+    std::vector<Square> squares(static_cast<std::size_t>(across) *
+                                static_cast<std::size_t>((window.height + kSide - 1) / kSide));
+    for (int row = 0; row < window.height; ++row)
+        for (int col = 0; col < window.width; ++col) {
+            const float* e = error.at(col, row);
+            const float sum = e[0] + e[1] + e[2];
+            Square& square = squares[static_cast<std::size_t>(row / kSide * across + col / kSide)];
+            if (sum > square.error) square = {sum, window.x + col, window.y + row};
+        }
+    std::stable_sort(squares.begin(), squares.end(),
+                     [](const Square& a, const Square& b) { return a.error > b.error; });
+    for (std::size_t i = 0; i < squares.size() && i < static_cast<std::size_t>(count) / 4; ++i)
+        if (squares[i].error >= 0) places.emplace_back(squares[i].x, squares[i].y);
+    return places;
+}
+
+/// |x - r|, or without a reference the predicted error.
+Image errorImage(const Image& colour, const std::optional<Image>& stddev,
+                 const std::optional<ReferenceImage>& reference) {
+    if (!reference) return stddev ? *stddev : Image(colour.data, colour.channels);
+    Image error = colour;
+    for (std::size_t i = 0; i < error.pixels.size(); ++i)
+        error.pixels[i] = std::abs(colour.pixels[i] - reference->colour.pixels[i]);
+    return error;
+}
+
+/// One sweep while it runs.
+class Runner {
+  public:
+    Runner(SweepOptions options, std::function<void(const std::string&)> log)
+        : options_(std::move(options)), log_(std::move(log)) {}
+
+    Sweep run() {
+        prepare();
+        std::error_code status;
+        fs::create_directories(options_.folder + "/images", status);
+        fs::create_directories(options_.folder + "/work", status);
+        if (status) throw Error(options_.folder, "expected to make this folder: " + status.message());
+        ResultsFile results(options_.folder + "/results.jsonl");
+        results_ = &results;
+        total_ = countSteps();
+        for (int seed = 1; seed <= options_.seeds; ++seed)
+            for (const SweepSampling& sampling : samplings_)
+                if (seed <= repetitions(sampling)) runSampling(sampling, seed);
+        if (!options_.keepDumps) fs::remove_all(options_.folder + "/work", status);
+        writeCsv();
+        results_ = nullptr;
+        sweep_.options = options_;
+        return std::move(sweep_);
+    }
+
+  private:
+    struct Task {
+        const SweepMethod* method;
+        SweepRecord record;
+    };
+
+    void say(const std::string& text) const {
+        if (log_) log_(text);
+    }
+
+    // --- before anything is run
+
+    void prepare() {
+        const std::string extension = fs::path(options_.input).extension().string();
+        const bool scene = extension == ".glb" || extension == ".gltf";
+        if (!scene && extension != ".exr")
+            throw Error(options_.input, "expected a scene (.glb, .gltf) or a sample dump (.exr)");
+        sweep_.fromDump = !scene;
+        if (options_.methods.empty()) throw Error("", "expected at least one method");
+        if (options_.seeds < 1) throw Error("", "expected at least one seed");
+        inputIdentity_ = fileIdentity(options_.input);
+        if (!options_.reference.empty()) readReference();
+        for (const char* program : {"vlx-trace", "vlx-pack", "vlx-krige"}) identify(program);
+        for (auto* methods : {&options_.methods, &options_.variations}) {
+            if (!reference_)  // no best sigma without knowing what is best
+                std::erase_if(*methods, [](const SweepMethod& m) {
+                    return m.command.find("{sigma}") != std::string::npos;
+                });
+            for (const SweepMethod& method : *methods) identify(firstWord(method.command));
+        }
+        scene ? prepareScene() : prepareDump();
+        if (options_.detailSpp == 0) options_.detailSpp = options_.spp[(options_.spp.size() - 1) / 2];
+        for (const int spp : options_.spp) samplings_.push_back({false, static_cast<double>(spp)});
+        if (scene)
+            for (const double tolerance : options_.tolerances) samplings_.push_back({true, tolerance});
+        sweep_.machine = thisMachine();
+        char date[32];
+        const std::time_t now = std::time(nullptr);
+        std::tm utc{};
+        std::strftime(date, sizeof date, "%Y-%m-%d %H:%M UTC", ::gmtime_r(&now, &utc));
+        sweep_.date = date;
+    }
+
+    void readReference() {
+        const Image image = readImage(options_.reference);
+        reference_ = ReferenceImage{colourOf(image, options_.reference), {}};
+        if (hasLayer(image, kStddev)) reference_->stddev = colourOf(image, options_.reference, kStddev);
+        referenceIdentity_ = fileIdentity(options_.reference);
+    }
+
+    /// Finds the program, and what tells this version of it from others.
+    void identify(const std::string& program) {
+        if (programs_.contains(program)) return;
+        std::string path = options_.programs + "/" + program;
+        if (!program.starts_with("vlx-") || !fs::exists(path)) {
+            ProcessRun found = runCommand("command -v " + program);
+            if (found.exitCode != 0 || found.out.empty())
+                throw Error(program, "expected a program that the shell finds");
+            found.out.erase(found.out.find_last_not_of('\n') + 1);
+            path = found.out;
+        }
+        std::error_code ignored;
+        // A shell builtin is no file: its name has to do.
+        const std::string identity = fs::is_regular_file(path, ignored) ? fileIdentity(path) : path;
+        programs_[program] = {path, identity};
+    }
+
+    void prepareScene() {
+        if (reference_) {
+            const Window& window = reference_->colour.data;
+            if (options_.width == 0) options_.width = window.width;
+            if (options_.height == 0) options_.height = window.height;
+            if (options_.width != window.width || options_.height != window.height)
+                throw Error(options_.reference, "expected a reference of " + std::to_string(options_.width) +
+                                                    " x " + std::to_string(options_.height) +
+                                                    " pixels, found " + std::to_string(window.width) + " x " +
+                                                    std::to_string(window.height));
+        }
+        if (options_.spp.empty()) options_.spp = {4, 16, 64, 256};
+    }
+
+    void prepareDump() {
+        const ProcessRun run =
+            runCommand(executable("vlx-pack info " + shellQuoted(options_.input) + " --json"));
+        if (run.exitCode != 0) throw Error("", "vlx-pack info failed: " + run.err);
+        const Json info = Json::parse(run.out);
+        const Window window{info["dataWindow"]["x"], info["dataWindow"]["y"], info["dataWindow"]["width"],
+                            info["dataWindow"]["height"]};
+        if (reference_ && !(reference_->colour.data == window)) {
+            const auto text = [](const Window& w) {
+                return std::to_string(w.width) + " x " + std::to_string(w.height) + " pixels at (" +
+                       std::to_string(w.x) + ", " + std::to_string(w.y) + ")";
+            };
+            throw Error(options_.reference,
+                        "expected the dump's " + text(window) + ", found " + text(reference_->colour.data));
+        }
+        dumpSamples_ = info["samples"]["min"];
+        const int replicates = info["samples"]["replicates"];
+        if (dumpSamples_ < 1)
+            throw Error(options_.input, "expected samples in every pixel, found an empty one");
+        if (options_.traceSeconds == 0 && info.contains("renderSeconds"))
+            options_.traceSeconds = info["renderSeconds"];
+        sweep_.samplingTimeKnown = options_.traceSeconds > 0;
+        meanSamples_ = info["samples"]["mean"];
+        if (options_.spp.empty())
+            for (int spp = dumpSamples_; spp > 0 && options_.spp.size() < 5; spp /= 2) {
+                if (replicates > 1 && std::fmod(static_cast<double>(spp) * replicates, meanSamples_) != 0)
+                    break;
+                options_.spp.insert(options_.spp.begin(), spp);
+                if (spp % 2 != 0) break;
+            }
+        for (const int spp : options_.spp)
+            if (spp > dumpSamples_)
+                throw Error(options_.input, "expected at least " + std::to_string(spp) +
+                                                " samples in every pixel, found " +
+                                                std::to_string(dumpSamples_));
+    }
+
+    // --- the plan
+
+    /// Of a dump no more than it has disjoint sub-sets.
+    int repetitions(const SweepSampling& sampling) const {
+        return sweep_.fromDump ? std::min(options_.seeds, dumpSamples_ / static_cast<int>(sampling.setting))
+                               : options_.seeds;
+    }
+
+    std::vector<const SweepMethod*> methodsFor(const SweepSampling& sampling) const {
+        std::vector<const SweepMethod*> methods;
+        for (const SweepMethod& method : options_.methods)
+            if (!sampling.hierarchical || method.hierarchical) methods.push_back(&method);
+        if (!sampling.hierarchical && sampling.setting == options_.detailSpp)
+            for (const SweepMethod& method : options_.variations) methods.push_back(&method);
+        return methods;
+    }
+
+    int countSteps() const {
+        int steps = 0;
+        for (int seed = 1; seed <= options_.seeds; ++seed)
+            for (const SweepSampling& sampling : samplings_)
+                if (seed <= repetitions(sampling)) steps += 1 + static_cast<int>(methodsFor(sampling).size());
+        return steps;
+    }
+
+    /// Runs of different settings must be independent of each other: no two share a seed of vlx-trace.
+    static std::uint32_t seedOf(const SweepSampling& sampling, int seed) {
+        return static_cast<std::uint32_t>(
+            hashOf(seed, sampling.hierarchical ? 1 : 0, std::llround(sampling.setting * 1e6)) >> 33);
+    }
+
+    std::string samplingCommand(const SweepSampling& sampling, int seed) const {
+        const std::string input = shellQuoted(options_.input);
+        if (sweep_.fromDump)  // the parts of one division are disjoint
+            return "vlx-pack subset " + input + " -o {output} --samples " + numberText(sampling.setting) +
+                   " --part " + std::to_string(seed - 1) + " --seed " + std::to_string(seedOf(sampling, 0));
+        std::string command = "vlx-trace " + input + " -o {output} --json --seed " +
+                              std::to_string(seedOf(sampling, seed)) +
+                              (sampling.hierarchical ? " --hierarchical --tolerance " : " --spp ") +
+                              numberText(sampling.setting);
+        if (options_.width > 0) command += " --width " + std::to_string(options_.width);
+        if (options_.height > 0) command += " --height " + std::to_string(options_.height);
+        if (options_.threads > 0) command += " --threads " + std::to_string(options_.threads);
+        return command + (options_.traceArguments.empty() ? "" : " " + options_.traceArguments);
+    }
+
+    std::string methodCommand(const SweepMethod& method, const SweepSampling& sampling, int seed) const {
+        return filled(method.command, {{"spp", numberText(sampling.setting)},
+                                       {"seed", std::to_string(seed)},
+                                       {"threads", std::to_string(options_.threads)}});
+    }
+
+    std::string executable(const std::string& command) const {
+        const std::string program = firstWord(command);
+        return shellQuoted(programs_.at(program).first) + command.substr(program.size());
+    }
+
+    std::string samplingKey(const std::string& command) const {
+        return hex(textHash(command, textHash(inputIdentity_ + programs_.at(firstWord(command)).second)));
+    }
+
+    std::string imageKey(const std::string& samplingKey, const std::string& command) const {
+        return hex(textHash(
+            command, textHash(samplingKey + referenceIdentity_ + programs_.at(firstWord(command)).second)));
+    }
+
+    // --- the work
+
+    void announce(const std::string& what, const SweepSampling& sampling, int seed, const SweepRecord& record,
+                  bool reused) {
+        ++step_;
+        char time[32];
+        std::snprintf(time, sizeof time, "%.2f s", record.seconds);
+        std::string text = "[" + std::to_string(step_) + "/" + std::to_string(total_) + "] " + what + ", " +
+                           samplingText(sampling) + ", seed " + std::to_string(seed) + ": ";
+        text += !record.failure.empty() ? "failed: " + record.failure
+                                        : (std::isfinite(record.seconds) ? std::string(time) : "done");
+        say(text + (reused ? " (done before)" : ""));
+    }
+
+    void runSampling(const SweepSampling& sampling, int seed) {
+        const std::string command = samplingCommand(sampling, seed);
+        const std::string key = samplingKey(command);
+        const std::string dump = options_.folder + "/work/" + key + ".exr";
+
+        std::vector<Task> tasks;
+        for (const SweepMethod* method : methodsFor(sampling)) {
+            SweepRecord record;
+            record.method = method->name;
+            record.knob = method->knob;
+            record.sampling = sampling;
+            record.seed = seed;
+            record.command = methodCommand(*method, sampling, seed);
+            record.key = imageKey(key, record.command);
+            if (seed == 1 && method->knob.empty()) record.file = "images/" + record.key + ".exr";
+            tasks.push_back({method, record});
+        }
+
+        const SweepRecord* known = results_->find(key);
+        const bool needed = std::any_of(tasks.begin(), tasks.end(), [&](const Task& task) {
+            return !done(task.record) || (inspects(task) && !doneInspection(task.record));
+        });
+        SweepRecord traced = known ? *known : SweepRecord{};
+        const bool reused = known && (!needed || fs::exists(dump));
+        if (!reused) traced = sample(command, key, dump, sampling, seed);
+        if (reused) ++sweep_.reused;
+        announce(sweep_.fromDump ? "sub-set" : "tracing", sampling, seed, traced, reused);
+        sweep_.records.push_back(traced);
+
+        for (const Task& task : tasks) {
+            const SweepRecord* before = done(task.record);
+            if (before) ++sweep_.reused;
+            const SweepRecord record = before ? *before : makeImage(task, dump);
+            announce(record.method, sampling, seed, record, before != nullptr);
+            sweep_.records.push_back(record);
+            if (inspects(task) && record.failure.empty()) inspect(task, record, dump);
+        }
+        std::error_code ignored;
+        if (!options_.keepDumps) fs::remove(dump, ignored);
+    }
+
+    const SweepRecord* done(const SweepRecord& record) const {
+        const SweepRecord* found = results_->find(record.key);
+        return found && (record.file.empty() || fs::exists(options_.folder + "/" + record.file)) ? found
+                                                                                                 : nullptr;
+    }
+
+    SweepRecord sample(const std::string& command, const std::string& key, const std::string& dump,
+                       const SweepSampling& sampling, int seed) {
+        SweepRecord record;
+        record.kind = SweepKind::Sampling;
+        record.key = key;
+        record.sampling = sampling;
+        record.seed = seed;
+        record.command = filled(command, {{"output", "samples.exr"}});
+        record.load = loadAverage();
+        const ProcessRun run = runCommand(executable(filled(command, {{"output", shellQuoted(dump)}})));
+        if (run.exitCode != 0)
+            throw Error(
+                "", record.command + " failed (exit code " + std::to_string(run.exitCode) + "):\n" + run.err);
+        record.dumpBytes = static_cast<std::int64_t>(fs::file_size(dump));
+        if (sweep_.fromDump) {
+            record.samplesPerPixel = sampling.setting;
+            record.seconds =
+                sweep_.samplingTimeKnown ? options_.traceSeconds * sampling.setting / meanSamples_ : kNan;
+            record.cpuSeconds = kNan;  // the renderer's, not ours to know
+            if (sweep_.samplingTimeKnown) record.stages["trace"] = record.seconds;
+        } else {
+            const Json report = Json::parse(run.out);
+            const double trace = report["traceSeconds"], write = report["writeCpuSeconds"];
+            const double pixels = report["width"].get<double>() * report["height"].get<double>();
+            record.samplesPerPixel = report["samples"].get<double>() / pixels;
+            record.seconds = run.seconds;
+            record.cpuSeconds = run.cpuSeconds();
+            record.peakBytes = run.peakBytes;
+            // Writing goes on beside tracing: of the wall time it gets its share of the processors.
+            const double written = std::min(trace, write / report["threads"].get<double>());
+            record.stages = {{"trace", trace - written},
+                             {"write dump", written},
+                             {"load scene", std::max(0.0, run.seconds - trace)}};
+        }
+        results_->add(record);
+        return record;
+    }
+
+    SweepRecord makeImage(const Task& task, const std::string& dump) {
+        SweepRecord record = task.record;
+        const std::string image = record.file.empty() ? options_.folder + "/work/" + record.key + ".exr"
+                                                      : options_.folder + "/" + record.file;
+        if (record.command.find("{sigma}") != std::string::npos) {
+            const double sigma =
+                bestSigma(colourOf(readImage(dump), dump), reference_->colour, options_.input);
+            record.values["sigma"] = sigma;
+            record.command = filled(record.command, {{"sigma", numberText(sigma)}});
+        }
+        record.load = loadAverage();
+        std::error_code ignored;
+        fs::remove(image, ignored);
+        const ProcessRun run = runCommand(executable(
+            filled(record.command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(image)}})));
+        record.command = filled(record.command, {{"input", "samples.exr"}, {"output", "image.exr"}});
+        record.seconds = run.seconds;
+        record.cpuSeconds = run.cpuSeconds();
+        record.peakBytes = run.peakBytes;
+        if (run.exitCode != 0)
+            record.failure = "exit code " + std::to_string(run.exitCode) + ": " + lastLine(run.err);
+        else
+            judge(record, run, image);
+        if (record.file.empty()) fs::remove(image, ignored);
+        results_->add(record);
+        return record;
+    }
+
+    /// Metrics, predicted error and stages of an image that was made.
+    void judge(SweepRecord& record, const ProcessRun& run, const std::string& path) const {
+        try {
+            const Image image = readImage(path);
+            const Image colour = colourOf(image, path);
+            std::optional<Image> stddev;
+            if (hasLayer(image, kStddev)) stddev = colourOf(image, path, kStddev);
+            if (reference_) {
+                const Comparison comparison = compareColour(reference_->colour, colour, path);
+                for (const MetricInfo& info : metricInfos())
+                    record.values[std::string(info.name)] = comparison[info.metric];
+                if (stddev)
+                    record.reliability =
+                        reliabilityOf(reference_->colour, colour, *stddev, reference_->stddev, path);
+            }
+            if (stddev) {
+                const PredictedError predicted = predictedError(colour, *stddev, path);
+                record.values["predicted_rmse"] = predicted.rmse;
+                record.values["predicted_relmse"] = predicted.relMse;
+            }
+        } catch (const Error& error) {
+            record.failure = error.what();
+            return;
+        }
+        record.stages = stagesOf(run);
+    }
+
+    static std::map<std::string, double> stagesOf(const ProcessRun& run) {
+        std::map<std::string, double> stages;
+        const Json report = Json::parse(run.out, nullptr, false);
+        if (report.is_object()) {
+            if (const auto seconds = report.find("seconds");
+                seconds != report.end() && seconds->is_object()) {
+                for (const auto& [stage, value] : seconds->items())
+                    if (value.is_number()) stages[stage] = value;
+            } else {
+                for (const auto& [field, stage] :
+                     {std::pair{"readSeconds", "read"}, {"solveSeconds", "solve"}})
+                    if (const auto value = report.find(field); value != report.end() && value->is_number())
+                        stages[stage] = *value;
+            }
+        }
+        double rest = run.seconds;
+        for (const auto& [stage, value] : stages) rest -= value;
+        stages["other"] = std::max(0.0, rest);
+        return stages;
+    }
+
+    static std::string lastLine(std::string text) {
+        text.erase(text.find_last_not_of(" \n") + 1);
+        const std::size_t end = text.rfind('\n');
+        return end == std::string::npos ? text : text.substr(end + 1);
+    }
+
+    // --- regions
+
+    bool inspects(const Task& task) const {
+        return task.method->inspectable && options_.inspectedRegions > 0 && task.record.seed == 1 &&
+               !task.record.sampling.hierarchical && task.record.sampling.setting == options_.detailSpp;
+    }
+
+    std::string inspectionKey(const SweepRecord& record) const {
+        return hex(textHash(record.key + " inspect " + std::to_string(options_.inspectedRegions)));
+    }
+
+    const SweepRecord* doneInspection(const SweepRecord& record) const {
+        const SweepRecord* found = results_->find(inspectionKey(record));
+        return found && fs::exists(options_.folder + "/" + found->file) ? found : nullptr;
+    }
+
+    void inspect(const Task& task, const SweepRecord& image, const std::string& dump) {
+        SweepRecord record;
+        if (const SweepRecord* before = doneInspection(image)) {
+            record = *before;
+        } else {
+            record = image;
+            record.kind = SweepKind::Inspection;
+            record.key = inspectionKey(image);
+            record.values.clear();
+            record.stages.clear();
+            record.reliability.reset();
+            record.file = "images/" + record.key + ".exr.json";
+            const std::string path = options_.folder + "/" + image.file;
+            const Image made = readImage(path);
+            const Image colour = colourOf(made, path);
+            std::optional<Image> stddev;
+            if (hasLayer(made, kStddev)) stddev = colourOf(made, path, kStddev);
+            std::string command = methodCommand(*task.method, image.sampling, image.seed) + " --diagnostics";
+            for (const auto& [x, y] :
+                 inspectedPixels(errorImage(colour, stddev, reference_), options_.inspectedRegions))
+                command += " --inspect " + std::to_string(x) + "," + std::to_string(y);
+            const std::string output = options_.folder + "/images/" + record.key + ".exr";
+            const ProcessRun run = runCommand(
+                executable(filled(command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(output)}})));
+            record.command = filled(command, {{"input", "samples.exr"}, {"output", "image.exr"}});
+            record.seconds = run.seconds;
+            record.cpuSeconds = run.cpuSeconds();
+            record.peakBytes = run.peakBytes;
+            if (run.exitCode != 0)
+                record.failure = "exit code " + std::to_string(run.exitCode) + ": " + lastLine(run.err);
+            std::error_code ignored;
+            fs::remove(output, ignored);
+            results_->add(record);
+        }
+        sweep_.records.push_back(record);
+    }
+
+    void writeCsv() const {
+        OutputFile file(options_.folder + "/results.csv");
+        std::ofstream stream(file.temporaryPath(), std::ios::binary);
+        stream << toCsv(sweep_.records);
+        stream.close();
+        if (!stream) throw Error(file.path(), "writing failed");
+        file.commit();
+    }
+
+    SweepOptions options_;
+    std::function<void(const std::string&)> log_;
+    Sweep sweep_;
+    std::vector<SweepSampling> samplings_;
+    std::optional<ReferenceImage> reference_;
+    std::string inputIdentity_, referenceIdentity_;
+    std::map<std::string, std::pair<std::string, std::string>> programs_;  // name -> path, identity
+    ResultsFile* results_ = nullptr;
+    int dumpSamples_ = 0;
+    double meanSamples_ = 0;
+    int step_ = 0, total_ = 0;
+};
+
+}  // namespace
+
+Machine thisMachine() {
+    Machine machine;
+    std::ifstream cpu("/proc/cpuinfo");
+    for (std::string line; std::getline(cpu, line);)
+        if (line.starts_with("model name")) {
+            machine.processor = line.substr(std::min(line.size(), line.find(':') + 2));
+            break;
+        }
+    machine.processors = static_cast<int>(std::thread::hardware_concurrency());
+    machine.memoryGigabytes = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) *
+                              static_cast<double>(::sysconf(_SC_PAGE_SIZE)) / (1 << 30);
+    utsname system{};
+    if (::uname(&system) == 0) machine.system = std::string(system.sysname) + " " + system.release;
+    return machine;
+}
+
+Sweep runSweep(SweepOptions options, const std::function<void(const std::string&)>& log) {
+    return Runner(std::move(options), log).run();
+}
+
+}  // namespace vlx
