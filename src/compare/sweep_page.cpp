@@ -221,8 +221,9 @@ Json pageData(const Sweep& sweep, const SweepSummary& summary, const SweepPageOp
 }
 
 void replace(std::string& text, std::string_view place, std::string_view content) {
-    const std::size_t at = text.find(place);
-    if (at != std::string::npos) text.replace(at, place.size(), content);
+    for (std::size_t at = text.find(place); at != std::string::npos;
+         at = text.find(place, at + content.size()))
+        text.replace(at, place.size(), content);
 }
 
 std::string escaped(const std::string& text) {

@@ -156,6 +156,7 @@ std::vector<SweepSeries> seriesOf(const Sweep& sweep, const std::vector<SweepSet
         std::stable_sort(series.settings.begin(), series.settings.end(), [&](std::size_t a, std::size_t b) {
             return settings[a].samplesPerPixel < settings[b].samplesPerPixel;
         });
+        if (series.settings.size() < 2) continue;  // repetitions of one setting scatter, they have no slope
         for (const SweepMeasure& measure : sweepMeasures()) {
             std::vector<double> samples, seconds, errors;
             for (const std::size_t i : series.settings) {

@@ -106,7 +106,7 @@ function curveChart(target, curves, titles) {
     y: { ...logLimits(points.flatMap((p) => [p.y, ...bounded(p.yRange, p.y)])), title: titles.y },
     label: `${titles.y} against ${titles.x}`,
   });
-  const clip = (v) => Math.min(Math.max(v, 0), 400);
+  const clip = (v) => Math.min(Math.max(v, 12), 400 - 46);  // intervals end at the frame
   for (const curve of curves) {
     const line = curve.points.map((p, k) => `${k ? 'L' : 'M'}${x(p.x)},${y(p.y)}`).join('');
     svg.append(draw('path', { d: line, fill: 'none', stroke: colour(curve.index), 'stroke-width': 2,

@@ -65,24 +65,6 @@ function drawCalibration(r) {
   $('scores').replaceChildren(scores.svg);
 }
 
-/** gamma(h) of a model as vlx-krige writes it: {nugget, structures: [{type, sill, range, shape}]}. */
-function semivariance(model, h) {
-  if (h <= 0) return 0;
-  let gamma = model.nugget;
-  for (const s of model.structures) {
-    const t = h / s.range;
-    switch (s.type) {
-      case 'spherical': gamma += s.sill * (t >= 1 ? 1 : 1.5 * t - .5 * t ** 3); break;
-      case 'exponential': gamma += s.sill * (1 - Math.exp(-t)); break;
-      case 'gaussian': gamma += s.sill * (1 - Math.exp(-t * t)); break;
-      case 'stable': gamma += s.sill * (1 - Math.exp(-(t ** s.shape))); break;
-      case 'linear': gamma += s.sill * t; break;
-      default: return NaN;  // Matern needs Bessel functions: its curve comes as points (model.curve)
-    }
-  }
-  return gamma;
-}
-
 function startInspector(data) {
   if (data.inspections.length === 0) {
     $('variograms').replaceChildren(make('h2', {}, 'Variograms'), make('p', { class: 'note' }, 'No regions were inspected.'));
@@ -167,7 +149,11 @@ function drawRegion(region) {
   const skip = new Set(['inspection']);
   const rows = Object.entries(region).filter(([name]) => !skip.has(name)).map(([name, value]) => [name, value]);
   if (inspection) {
-    for (const [name, value] of Object.entries(inspection.crossValidation ?? {})) rows.push([`cross-validation: ${name}`, value]);
+    inspection.model?.structures.forEach((m, i) => rows.push([`structure ${i + 1}`, `${m.type}, sill ${digits(m.sill)}, range ${digits(m.range)}, shape ${digits(m.shape)}`]));
+    if (inspection.crossValidation) {
+      rows.push(['cross-validation: RMSE', inspection.crossValidation.rmse]);
+      rows.push(['cross-validation: mean z² (1 is right)', inspection.crossValidation.meanSquareScore]);
+    }
     rows.push(['fallbacks', inspection.fallbacks.length ? inspection.fallbacks.join('; ') : 'none']);
     if (inspection.cloud) rows.push(['pairs', `${inspection.pairs} in the cloud, ${inspection.cloud.length} drawn`]);
   }
@@ -179,7 +165,7 @@ function drawRegion(region) {
   const classes = inspection.classes.filter((c) => c.pairs > 0);
   const far = Math.max(...classes.map((c) => c.distance), ...inspection.cloud.map((p) => p[0])) * 1.03;
   const tops = classes.map((c) => c.semivariance + (c.standardError ?? 0));
-  const sill = inspection.model ? inspection.model.nugget + inspection.model.structures.reduce((a, s) => a + s.sill, 0) : 0;
+  const sill = inspection.model ? Math.max(...inspection.model.curve.map((p) => p[1])) : 0;
   const sorted = inspection.cloud.map((p) => p[1]).sort((a, b) => a - b);
   const high = Math.max(...tops, Math.min(sill, 2 * Math.max(...tops)), sorted[Math.floor(sorted.length * .9)] ?? 0) * 1.1 || 1;
   const low = Math.min(0, ...classes.map((c) => c.semivariance - (c.standardError ?? 0)), sorted[Math.floor(sorted.length * .02)] ?? 0);
@@ -187,8 +173,7 @@ function drawRegion(region) {
   const clipped = (v) => Math.min(Math.max(v, low), high);
   for (const [h, g] of inspection.cloud) if (g <= high && g >= low) chart.svg.append(draw('circle', { cx: chart.x(h), cy: chart.y(g), r: 1.6, fill: 'var(--soft)', opacity: .45 }));
   if (inspection.model) {
-    const curve = inspection.model.curve ?? Array.from({ length: 121 }, (_, i) => { const h = far * (i + .02) / 120; return [h, semivariance(inspection.model, h)]; });
-    const path = curve.filter((p) => Number.isFinite(p[1]) && p[0] <= far).map((p, i) => `${i ? 'L' : 'M'}${chart.x(p[0])},${chart.y(clipped(p[1]))}`).join('');
+    const path = inspection.model.curve.filter((p) => Number.isFinite(p[1]) && p[0] <= far).map((p, i) => `${i ? 'L' : 'M'}${chart.x(p[0])},${chart.y(clipped(p[1]))}`).join('');
     chart.svg.append(draw('path', { d: path, fill: 'none', stroke: colour(2), 'stroke-width': 2.5, class: 'model' }));
   }
   for (const c of classes) {

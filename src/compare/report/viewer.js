@@ -165,7 +165,7 @@ async function drawCrops(data, sources) {
   const shown = [...sources.filter((s) => !s.setting), ...chosen];
   target.replaceChildren(make('h3', {}, budget && !data.imageTimesOnly ? `Crops, each method’s setting nearest to ${digits(budget)} s` : 'Crops, each method at its most samples'));
   for (const [x, y, w, h] of crops) {
-    const row = make('div', { class: 'crop-grid' });
+    const row = make('div', { class: 'crop-grid', style: `--columns:${Math.min(shown.length, 8)}` });
     for (const source of shown) {
       const full = await canvasOf('radiance', source.image, null, 1), f = source.image.factor;
       const canvas = make('canvas', { width: Math.max(1, Math.round(w / f)), height: Math.max(1, Math.round(h / f)), role: 'img', 'aria-label': source.name });
