@@ -81,10 +81,11 @@ function startViewer(data) {
     state.y = Math.min(Math.max(state.y, .5 / zoom), 1 - .5 / zoom);
     const sx = state.x * width - w / 2, sy = state.y * height - h / 2;
     context.imageSmoothingEnabled = false;
-    for (const [canvas, from, to] of [[left, 0, state.split], [right, state.split, 1]]) {
+    const edge = Math.round(state.split * picture.width);
+    for (const [canvas, from, to] of [[left, 0, edge], [right, edge, picture.width]]) {
       context.save();
       context.beginPath();
-      context.rect(from * picture.width, 0, (to - from) * picture.width, picture.height);
+      context.rect(from, 0, to - from, picture.height);
       context.clip();
       context.drawImage(canvas, sx, sy, w, h, 0, 0, picture.width, picture.height);
       context.restore();
