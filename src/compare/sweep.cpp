@@ -142,6 +142,13 @@ class ResultsFile {
     std::map<std::string, SweepRecord> records_;
 };
 
+/// What a program of ours printed with --json.
+Json reportOf(const ProcessRun& run, const std::string& command) {
+    Json report = Json::parse(run.out, nullptr, false);
+    if (!report.is_object()) throw Error(command, "expected a JSON report on standard output");
+    return report;
+}
+
 double loadAverage() {
     double load = 0;
     return ::getloadavg(&load, 1) == 1 ? load : kNan;
@@ -324,9 +331,9 @@ class Runner {
         const ProcessRun run =
             runCommand(executable("vlx-pack info " + shellQuoted(options_.input) + " --json"));
         if (run.exitCode != 0) throw Error("", "vlx-pack info failed: " + run.err);
-        const Json info = Json::parse(run.out);
-        const Window window{info["dataWindow"]["x"], info["dataWindow"]["y"], info["dataWindow"]["width"],
-                            info["dataWindow"]["height"]};
+        const Json info = reportOf(run, "vlx-pack info");
+        const Window window{info.at("dataWindow").at("x"), info.at("dataWindow").at("y"),
+                            info.at("dataWindow").at("width"), info.at("dataWindow").at("height")};
         if (reference_ && !(reference_->colour.data == window)) {
             const auto text = [](const Window& w) {
                 return std::to_string(w.width) + " x " + std::to_string(w.height) + " pixels at (" +
@@ -335,14 +342,14 @@ class Runner {
             throw Error(options_.reference,
                         "expected the dump's " + text(window) + ", found " + text(reference_->colour.data));
         }
-        dumpSamples_ = info["samples"]["min"];
-        const int replicates = info["samples"]["replicates"];
+        dumpSamples_ = info.at("samples").at("min");
+        const int replicates = info.at("samples").at("replicates");
         if (dumpSamples_ < 1)
             throw Error(options_.input, "expected samples in every pixel, found an empty one");
         if (options_.traceSeconds == 0 && info.contains("renderSeconds"))
-            options_.traceSeconds = info["renderSeconds"];
+            options_.traceSeconds = info.at("renderSeconds");
         sweep_.samplingTimeKnown = options_.traceSeconds > 0;
-        meanSamples_ = info["samples"]["mean"];
+        meanSamples_ = info.at("samples").at("mean");
         if (options_.spp.empty())
             for (int spp = dumpSamples_; spp > 0 && options_.spp.size() < 5; spp /= 2) {
                 if (replicates > 1 && std::fmod(static_cast<double>(spp) * replicates, meanSamples_) != 0)
@@ -505,15 +512,15 @@ class Runner {
             record.cpuSeconds = kNan;  // the renderer's, not ours to know
             if (sweep_.samplingTimeKnown) record.stages["trace"] = record.seconds;
         } else {
-            const Json report = Json::parse(run.out);
-            const double trace = report["traceSeconds"], write = report["writeCpuSeconds"];
-            const double pixels = report["width"].get<double>() * report["height"].get<double>();
-            record.samplesPerPixel = report["samples"].get<double>() / pixels;
+            const Json report = reportOf(run, record.command);
+            const double trace = report.at("traceSeconds"), write = report.at("writeCpuSeconds");
+            const double pixels = report.at("width").get<double>() * report.at("height").get<double>();
+            record.samplesPerPixel = report.at("samples").get<double>() / pixels;
             record.seconds = run.seconds;
             record.cpuSeconds = run.cpuSeconds();
             record.peakBytes = run.peakBytes;
             // Writing goes on beside tracing: of the wall time it gets its share of the processors.
-            const double written = std::min(trace, write / report["threads"].get<double>());
+            const double written = std::min(trace, write / report.at("threads").get<double>());
             record.stages = {{"trace", trace - written},
                              {"write dump", written},
                              {"load scene", std::max(0.0, run.seconds - trace)}};
@@ -542,7 +549,7 @@ class Runner {
         record.cpuSeconds = run.cpuSeconds();
         record.peakBytes = run.peakBytes;
         if (run.exitCode != 0)
-            record.failure = "exit code " + std::to_string(run.exitCode) + ": " + lastLine(run.err);
+            record.failure = failureOf(run);
         else
             judge(record, run, image);
         if (record.file.empty()) fs::remove(image, ignored);
@@ -598,10 +605,12 @@ class Runner {
         return stages;
     }
 
-    static std::string lastLine(std::string text) {
+    static std::string failureOf(const ProcessRun& run) {
+        std::string text = run.err;
         text.erase(text.find_last_not_of(" \n") + 1);
         const std::size_t end = text.rfind('\n');
-        return end == std::string::npos ? text : text.substr(end + 1);
+        if (end != std::string::npos) text = text.substr(end + 1);
+        return "exit code " + std::to_string(run.exitCode) + (text.empty() ? "" : ": " + text);
     }
 
     // --- regions
@@ -624,6 +633,7 @@ class Runner {
         SweepRecord record;
         if (const SweepRecord* before = doneInspection(image)) {
             record = *before;
+            ++sweep_.reused;
         } else {
             record = image;
             record.kind = SweepKind::Inspection;
@@ -648,8 +658,7 @@ class Runner {
             record.seconds = run.seconds;
             record.cpuSeconds = run.cpuSeconds();
             record.peakBytes = run.peakBytes;
-            if (run.exitCode != 0)
-                record.failure = "exit code " + std::to_string(run.exitCode) + ": " + lastLine(run.err);
+            if (run.exitCode != 0) record.failure = failureOf(run);
             std::error_code ignored;
             fs::remove(output, ignored);
             results_->add(record);

@@ -136,6 +136,7 @@ Json settingJson(const Sweep& sweep, const SweepSetting& s) {
                  {"values", mapJson(s.values)},
                  {"speedUp", mapJson(s.speedUp)},
                  {"errorRatio", mapJson(s.errorRatio)},
+                 {"samplesSaved", mapJson(s.samplesSaved)},
                  {"command", s.command},
                  {"samplingCommand", s.samplingCommand},
                  {"failures", s.failures},

@@ -178,14 +178,16 @@ std::vector<SweepSeries> seriesOf(const Sweep& sweep, const std::vector<SweepSet
     return all;
 }
 
+enum class Cost { Time, Samples };
+
 std::vector<CurvePoint> curveOf(const SweepSummary& summary, const SweepSeries& series,
-                                const std::string& measure) {
+                                const std::string& measure, Cost cost) {
     std::vector<CurvePoint> curve;
     for (const std::size_t i : series.settings) {
         const SweepSetting& s = summary.settings[i];
         if (has(s, measure))
-            curve.push_back({std::log(s.seconds.value), std::log(s.values.at(measure).value),
-                             logVariance(s.values.at(measure))});
+            curve.push_back({std::log(cost == Cost::Time ? s.seconds.value : s.samplesPerPixel),
+                             std::log(s.values.at(measure).value), logVariance(s.values.at(measure))});
     }
     return curve;
 }
@@ -207,7 +209,8 @@ int fewestRuns(const SweepSummary& summary, const SweepSeries& series) {
 void compareWithBaseline(SweepSummary& summary, const SweepSeries& baseline) {
     const int runs = fewestRuns(summary, baseline);
     for (const SweepMeasure& measure : sweepMeasures()) {
-        const std::vector<CurvePoint> curve = curveOf(summary, baseline, measure.name);
+        const auto byTime = curveOf(summary, baseline, measure.name, Cost::Time);
+        const auto bySamples = curveOf(summary, baseline, measure.name, Cost::Samples);
         for (SweepSetting& s : summary.settings) {
             if (!has(s, measure.name)) continue;
             const Interval& error = s.values.at(measure.name);
@@ -215,11 +218,16 @@ void compareWithBaseline(SweepSummary& summary, const SweepSeries& baseline) {
             const int count = std::min(runs, static_cast<int>(s.records.size()));
             const bool self = s.method == baseline.method && !s.sampling.hierarchical;
             if (self) continue;
-            if (const auto cost = costAtError(curve, logError, logVariance(error)))
+            if (const auto cost = costAtError(bySamples, logError, logVariance(error)))
+                s.samplesSaved[measure.name] = {
+                    ratioInterval(cost->log - std::log(s.samplesPerPixel), cost->variance, count),
+                    cost->extrapolated};
+            if (summary.imageTimesOnly) continue;
+            if (const auto cost = costAtError(byTime, logError, logVariance(error)))
                 s.speedUp[measure.name] = {
                     ratioInterval(cost->log - logSeconds, cost->variance + logVariance(s.seconds), count),
                     cost->extrapolated};
-            if (const auto other = errorAtCost(curve, logSeconds))
+            if (const auto other = errorAtCost(byTime, logSeconds))
                 s.errorRatio[measure.name] = {
                     ratioInterval(logError - other->log, other->variance + logVariance(error), count), false};
         }
@@ -239,7 +247,7 @@ std::vector<EqualTime> equalTimesOf(const SweepSummary& summary, const SweepSeri
         EqualTime time{budget.seconds.value, budget.method + ", " + samplingText(budget.sampling), {}};
         for (const SweepSeries& series : summary.series)
             for (const SweepMeasure& measure : sweepMeasures()) {
-                const auto curve = curveOf(summary, series, measure.name);
+                const auto curve = curveOf(summary, series, measure.name, Cost::Time);
                 if (const auto error = errorAtCost(curve, std::log(budget.seconds.value)))
                     time.errors[series.name][measure.name] = {
                         ratioInterval(error->log, error->variance, fewestRuns(summary, series)), false};
@@ -280,7 +288,7 @@ SweepSummary summarize(const Sweep& sweep) {
     for (const SweepSeries& series : summary.series)
         if (series.method == kBaseline && !series.hierarchical) {
             compareWithBaseline(summary, series);
-            summary.equalTimes = equalTimesOf(summary, series);
+            if (!summary.imageTimesOnly) summary.equalTimes = equalTimesOf(summary, series);
         }
     return summary;
 }
@@ -319,7 +327,7 @@ std::string toText(const SweepSummary& summary, const Sweep& sweep) {
     char line[256];
     std::snprintf(line, sizeof line, "%-32s %-16s %10s %22s %8s %10s\n",
                   summary.imageTimesOnly ? "method (times: image only)" : "method", "sampling", "seconds",
-                  measure.c_str(), "MB", "speed-up");
+                  measure.c_str(), "MB", summary.imageTimesOnly ? "samples x" : "time x");
     text << line;
     for (const SweepSetting& s : summary.settings) {
         std::string error = "-", speed = "-";
@@ -332,7 +340,8 @@ std::string toText(const SweepSummary& summary, const Sweep& sweep) {
                 error += line;
             }
         }
-        if (const auto found = s.speedUp.find(measure); found != s.speedUp.end()) {
+        const auto& gains = summary.imageTimesOnly ? s.samplesSaved : s.speedUp;
+        if (const auto found = gains.find(measure); found != gains.end()) {
             std::snprintf(line, sizeof line, "%s%.2f", found->second.extrapolated ? "~" : "",
                           found->second.ratio.value);
             speed = line;
@@ -343,6 +352,8 @@ std::string toText(const SweepSummary& summary, const Sweep& sweep) {
         text << line;
         for (const std::string& failure : s.failures) text << "    failed: " << failure << "\n";
     }
+    text << (summary.imageTimesOnly ? "samples x: times as many samples" : "time x: times as long")
+         << " as plain averaging takes to the same error (~: by its fitted line)\n";
     for (const SweepSeries& series : summary.series)
         if (const auto slope =
                 series.slopeBySamples.find(sweep.options.reference.empty() ? "predicted_rmse" : "rmse");

@@ -41,16 +41,16 @@ struct SweepSetting {
     std::vector<std::size_t> records;  ///< images, indices into Sweep::records
     std::vector<std::string> failures;
 
-    // Against plain averaging of uniform samples, for each measure that both have:
-    /// How many times as long averaging takes to the same error. Lower and upper bounds of both are from the
-    /// repetitions' scatter of both curves.
+    /// Against plain averaging of uniform samples (the method "mean"); the interval is from the scatter of
+    /// the repetitions of both.
     struct Ratio {
         Interval ratio;
         bool extrapolated = false;  ///< averaging was not measured at such an error: its fitted line's word
     };
-    std::map<std::string, Ratio> speedUp;
-    /// The error divided by averaging's in the same time.
-    std::map<std::string, Ratio> errorRatio;
+    // By measure, where both have it; the first two only where the time of sampling is known.
+    std::map<std::string, Ratio> speedUp;       ///< times as long averaging takes to the same error
+    std::map<std::string, Ratio> errorRatio;    ///< the error divided by averaging's in the same time
+    std::map<std::string, Ratio> samplesSaved;  ///< times as many samples averaging takes to the same error
 };
 
 /// The settings of one method along one ladder.
@@ -76,7 +76,7 @@ struct SweepSummary {
     std::vector<SweepSetting> settings;
     std::vector<SweepSeries> series;
     std::map<std::string, std::vector<std::size_t>> pareto;  ///< by measure: settings by increasing time
-    std::vector<EqualTime> equalTimes;
+    std::vector<EqualTime> equalTimes;  ///< empty where the time of sampling is not known
     /// The settings' times are those of the image alone: the renderer's are not known.
     bool imageTimesOnly = false;
 };

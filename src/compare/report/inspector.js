@@ -83,7 +83,7 @@ function startInspector(data) {
     const scale = Math.max(2, Math.ceil(640 / setting.image.width));
     canvas.width = setting.image.width * scale;
     canvas.height = setting.image.height * scale;
-    select(state.regions.findIndex((r) => r.inspection));
+    select(Math.max(state.regions.findIndex((r) => r.inspection?.model), state.regions.findIndex((r) => r.inspection)));
   }
 
   function box(region) {

@@ -1,6 +1,9 @@
 // Puts the page together.
 
 const data = JSON.parse($('data').textContent);
+// The headline chart alone, for tools/report-figure.
+if (location.hash === '#figure') document.body.classList.add('figure');
+
 const page = { measure: data.measures[0].name, hidden: new Set() };
 
 function update() {

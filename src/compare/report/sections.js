@@ -88,14 +88,14 @@ function drawTable(data, state) {
     make('td', {}, digits(s.samplesPerPixel)), withValue(s.samplingSeconds), withValue(s.imageSeconds), withValue(s.seconds),
     withValue(s.cpuSeconds), make('td', {}, digits(s.peakBytes / 2 ** 20)), withValue(s.values[measure]),
     extra.map((name) => withValue(s.values[name])),
-    ratioCell(s.speedUp[measure], true), ratioCell(s.errorRatio[measure], false),
+    ratioCell(s.samplesSaved[measure], true), ratioCell(s.speedUp[measure], true), ratioCell(s.errorRatio[measure], false),
     withValue(s.values.predicted_rmse), withValue(s.agreement)));
   $('table').replaceChildren(make('div', { class: 'scroll' }, make('table', {},
     make('thead', {}, make('tr', {}, ['setting', 'samples a pixel', 'tracing, s', 'reconstruction, s', 'total, s', 'processor, s', 'peak, MB', title,
-      ...extra.map((n) => ({ psnr: 'PSNR, dB', ssim: 'SSIM', bias: 'bias' })[n]), 'times faster than averaging', 'error by averaging’s',
+      ...extra.map((n) => ({ psnr: 'PSNR, dB', ssim: 'SSIM', bias: 'bias' })[n]), 'averaging needs samples ×', 'averaging needs time ×', 'error by averaging’s',
       'RMSE predicted', 'predicted / actual'].map((t) => make('th', {}, t)))),
     make('tbody', {}, rows))),
-    make('p', { class: 'note' }, 'Small: 95 % intervals over the repetitions. “Times faster”: time that plain averaging of uniform samples needs to the same error, divided by this setting’s; ~ where averaging was not run to that error and its fitted line was used. “Error by averaging’s”: in the same time. ' +
+    make('p', { class: 'note' }, 'Small: 95 % intervals over the repetitions. “Averaging needs”: samples, or time, that plain averaging of uniform samples needs to the same error, divided by this setting’s; ~ where averaging was not run to that error and its fitted line was used. “Error by averaging’s”: in the same time. ' +
       'Green and red: better and worse beyond the interval. Bold: on the Pareto front. The average is the tracer’s own image: no reconstruction time is counted for it' +
       (data.imageTimesOnly ? ' otherwise; here the renderer’s time is not known, and the time of averaging the dump is.' : '.') +
       ' Peak memory cannot be told below that of the program that measures (some 40 MB).'));
