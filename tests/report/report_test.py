@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Opens a sweep's report.html in headless Chromium and uses it: python3 report_test.py REPORT [--screenshots FOLDER]
+"""Opens reports of `vlx-compare sweep` in headless Chromium and uses them.
+
+    report_test.py REPORT.html [--screenshots FOLDER]
+    report_test.py --bin FOLDER --testdata FOLDER      makes small reports first, with and without a reference
 
 Drives chromedriver by the W3C WebDriver protocol with nothing but the standard library. Fails on any console message of
 the page, on any network request, and on controls that do not change what they should.
@@ -208,18 +211,37 @@ def use(browser, url, screenshots):
     check(not outside, f"nothing is loaded from elsewhere {outside[:3]}")
 
 
+def make_reports(programs, testdata, folder):
+    """Small sweeps of the test dump: with a reference (its own average) and a trace time, and without either."""
+    dump = os.path.join(testdata, "dumps", "tungsten_cornell.exr")
+    reference = os.path.join(folder, "reference.exr")
+    subprocess.run([os.path.join(programs, "vlx-krige"), dump, "-o", reference, "--method", "mean", "--quiet"], check=True)
+    sweep = [os.path.join(programs, "vlx-compare"), "sweep", dump, "--quiet", "--spp", "2,4", "--seeds", "2", "--inspect", "9"]
+    subprocess.run(sweep + ["-o", folder + "/with", "--reference", reference, "--trace-seconds", "8", "--crop", "102,124,8,8",
+                            "--external", "broken=exit 4; {input} {output}", "--target", "relmse=100"],
+                   stdout=subprocess.DEVNULL)  # exit code 1: one method fails, and is to be shown failing
+    subprocess.run(sweep + ["-o", folder + "/without", "--no-vary"], check=True)
+    return [folder + "/with/report.html", folder + "/without/report.html"]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("report")
+    parser.add_argument("report", nargs="?")
     parser.add_argument("--screenshots")
+    parser.add_argument("--bin")
+    parser.add_argument("--testdata")
     arguments = parser.parse_args()
     if arguments.screenshots:
         os.makedirs(arguments.screenshots, exist_ok=True)
-    browser = Browser()
-    try:
-        use(browser, pathlib.Path(arguments.report).resolve().as_uri(), arguments.screenshots)
-    finally:
-        browser.close()
+    with tempfile.TemporaryDirectory(prefix="variolux-report-") as folder:
+        reports = [arguments.report] if arguments.report else make_reports(arguments.bin, arguments.testdata, folder)
+        for report in reports:
+            print(report)
+            browser = Browser()
+            try:
+                use(browser, pathlib.Path(report).resolve().as_uri(), arguments.screenshots)
+            finally:
+                browser.close()
     print(f"{len(failures)} failed")
     return 1 if failures else 0
 
