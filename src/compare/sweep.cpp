@@ -315,7 +315,7 @@ class Runner {
 
     void prepareScene() {
         if (reference_) {
-            const Window& window = reference_->colour.data;
+            const Window& window = reference_->colour.display;  // of a crop, the whole picture
             if (options_.width == 0) options_.width = window.width;
             if (options_.height == 0) options_.height = window.height;
             if (options_.width != window.width || options_.height != window.height)
@@ -327,6 +327,16 @@ class Runner {
         if (options_.spp.empty()) options_.spp = {4, 16, 64, 256};
     }
 
+    void requireReferenceWindow(const Window& window) const {
+        const auto text = [](const Window& w) {
+            return std::to_string(w.width) + " x " + std::to_string(w.height) + " pixels at (" +
+                   std::to_string(w.x) + ", " + std::to_string(w.y) + ")";
+        };
+        const Window& found = reference_->colour.data;
+        if (!(found == window))
+            throw Error(options_.reference, "expected the dump's " + text(window) + ", found " + text(found));
+    }
+
     void prepareDump() {
         const ProcessRun run =
             runCommand(executable("vlx-pack info " + shellQuoted(options_.input) + " --json"));
@@ -334,14 +344,7 @@ class Runner {
         const Json info = reportOf(run, "vlx-pack info");
         const Window window{info.at("dataWindow").at("x"), info.at("dataWindow").at("y"),
                             info.at("dataWindow").at("width"), info.at("dataWindow").at("height")};
-        if (reference_ && !(reference_->colour.data == window)) {
-            const auto text = [](const Window& w) {
-                return std::to_string(w.width) + " x " + std::to_string(w.height) + " pixels at (" +
-                       std::to_string(w.x) + ", " + std::to_string(w.y) + ")";
-            };
-            throw Error(options_.reference,
-                        "expected the dump's " + text(window) + ", found " + text(reference_->colour.data));
-        }
+        if (reference_) requireReferenceWindow(window);
         dumpSamples_ = info.at("samples").at("min");
         const int replicates = info.at("samples").at("replicates");
         if (dumpSamples_ < 1)
@@ -504,6 +507,7 @@ class Runner {
         if (run.exitCode != 0)
             throw Error(
                 "", record.command + " failed (exit code " + std::to_string(run.exitCode) + "):\n" + run.err);
+        if (reference_) requireReferenceWindow(readImage(dump).data);
         record.dumpBytes = static_cast<std::int64_t>(fs::file_size(dump));
         if (sweep_.fromDump) {
             record.samplesPerPixel = sampling.setting;
@@ -529,10 +533,16 @@ class Runner {
         return record;
     }
 
+    /// Only what is complete gets its place among the results.
+    static void moveTo(const std::string& to, const std::string& from) {
+        std::error_code status;
+        fs::rename(from, to, status);
+        if (status) throw Error(to, "expected to move '" + from + "' here: " + status.message());
+    }
+
     SweepRecord makeImage(const Task& task, const std::string& dump) {
         SweepRecord record = task.record;
-        const std::string image = record.file.empty() ? options_.folder + "/work/" + record.key + ".exr"
-                                                      : options_.folder + "/" + record.file;
+        const std::string image = options_.folder + "/work/" + record.key + ".image.exr";
         if (record.command.find("{sigma}") != std::string::npos) {
             const double sigma =
                 bestSigma(colourOf(readImage(dump), dump), reference_->colour, options_.input);
@@ -552,7 +562,10 @@ class Runner {
             record.failure = failureOf(run);
         else
             judge(record, run, image);
-        if (record.file.empty()) fs::remove(image, ignored);
+        if (record.failure.empty() && !record.file.empty())
+            moveTo(options_.folder + "/" + record.file, image);
+        else
+            fs::remove(image, ignored);
         results_->add(record);
         return record;
     }
@@ -651,14 +664,17 @@ class Runner {
             for (const auto& [x, y] :
                  inspectedPixels(errorImage(colour, stddev, reference_), options_.inspectedRegions))
                 command += " --inspect " + std::to_string(x) + "," + std::to_string(y);
-            const std::string output = options_.folder + "/images/" + record.key + ".exr";
+            const std::string output = options_.folder + "/work/" + record.key + ".exr";
             const ProcessRun run = runCommand(
                 executable(filled(command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(output)}})));
             record.command = filled(command, {{"input", "samples.exr"}, {"output", "image.exr"}});
             record.seconds = run.seconds;
             record.cpuSeconds = run.cpuSeconds();
             record.peakBytes = run.peakBytes;
-            if (run.exitCode != 0) record.failure = failureOf(run);
+            if (run.exitCode != 0)
+                record.failure = failureOf(run);
+            else
+                moveTo(options_.folder + "/" + record.file, output + ".json");
             std::error_code ignored;
             fs::remove(output, ignored);
             results_->add(record);

@@ -62,7 +62,7 @@ struct SweepOptions {
     std::vector<double> tolerances;  ///< of hierarchical sampling; scenes only
     int seeds = 3;                   ///< repetitions; of a dump at most as many as it has disjoint sub-sets
     int detailSpp = 0;  ///< the rung for variations and inspected regions; 0: the lower middle of the ladder
-    int width = 0;      ///< of a scene's picture; 0: the reference's
+    int width = 0;      ///< of a scene's picture; 0: the reference's, or vlx-trace's default
     int height = 0;
     std::string traceArguments;  ///< further options of vlx-trace, for a scene
     double traceSeconds = 0;     ///< what the renderer took for the whole dump, if the dump does not say

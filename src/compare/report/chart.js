@@ -28,10 +28,10 @@ function marker(i, x, y, size = 5) {
 
 const dashes = ['', '6 3', '2 3', '8 3 2 3', '4 2', '1 3'];
 
-/** Ticks of a logarithmic axis: decades, with 2 and 5 (or all digits) when there are few. */
-function logTicks(low, high) {
-  const decades = Math.log10(high / low), ticks = [];
-  const steps = decades > 4 ? [1] : decades > 1.2 ? [1, 2, 5] : [1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9];
+/** Ticks of a logarithmic axis: decades, with 2 and 5 (or all digits) when there are few for the room (1: 480 pixels). */
+function logTicks(low, high, room = 1) {
+  const decades = Math.log10(high / low) / room, ticks = [];
+  const steps = decades > 3 ? [1] : decades > 1.2 ? [1, 2, 5] : [1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9];
   for (let e = Math.floor(Math.log10(low)); e <= Math.ceil(Math.log10(high)); ++e)
     for (const s of steps) {
       const value = s * 10 ** e;
@@ -61,7 +61,7 @@ function axes(options) {
   };
   const x = scale(options.x, left, width - right), y = scale(options.y, height - bottom, top);
   const svg = draw('svg', { viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': options.label });
-  for (const v of options.x.log ? logTicks(options.x.low, options.x.high) : linearTicks(options.x.low, options.x.high)) {
+  for (const v of options.x.log ? logTicks(options.x.low, options.x.high, (width - left - right) / 480) : linearTicks(options.x.low, options.x.high)) {
     svg.append(draw('line', { x1: x(v), x2: x(v), y1: top, y2: height - bottom, class: 'grid' }));
     const text = draw('text', { x: x(v), y: height - bottom + 17, 'text-anchor': 'middle', class: 'soft' });
     text.textContent = digits(v);

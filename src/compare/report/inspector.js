@@ -157,7 +157,7 @@ function drawRegion(region) {
     rows.push(['fallbacks', inspection.fallbacks.length ? inspection.fallbacks.join('; ') : 'none']);
     if (inspection.cloud) rows.push(['pairs', `${inspection.pairs} in the cloud, ${inspection.cloud.length} drawn`]);
   }
-  $('region').replaceChildren(make('table', {}, make('tbody', {}, rows.map(([name, value]) => make('tr', {}, make('td', {}, name), make('td', {}, typeof value === 'number' ? digits(value, 4) : String(value)))))));
+  $('region').replaceChildren(make('table', {}, make('tbody', {}, rows.map(([name, value]) => make('tr', {}, make('td', {}, name), make('td', {}, typeof value === 'number' ? digits(value, 4) : typeof value === 'string' ? value : JSON.stringify(value)))))));
   if (!inspection || inspection.classes.length === 0) {
     $('variogram').replaceChildren(make('p', { class: 'note' }, inspection ? 'This region has no variogram: too little data.' : 'This region was not inspected: only what was fitted is known.'));
     return;
