@@ -16,6 +16,7 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 #include "variolux/base/error.h"
@@ -83,6 +84,16 @@ std::string filled(std::string text, const std::map<std::string, std::string>& p
         at += place->second.size();
     }
     return text;
+}
+
+/// Which scripts and other files a command names: a change of theirs changes its results.
+std::string namedFiles(const std::string& command) {
+    std::string identities;
+    std::istringstream words(command);
+    std::error_code ignored;
+    for (std::string word; words >> word;)
+        if (fs::is_regular_file(word, ignored)) identities += fileIdentity(word);
+    return identities;
 }
 
 std::string firstWord(const std::string& command) { return command.substr(0, command.find(' ')); }
@@ -270,11 +281,15 @@ class Runner {
         if (!options_.reference.empty()) readReference();
         for (const char* program : {"vlx-trace", "vlx-pack", "vlx-krige"}) identify(program);
         for (auto* methods : {&options_.methods, &options_.variations}) {
-            if (!reference_)  // no best sigma without knowing what is best
-                std::erase_if(*methods, [](const SweepMethod& m) {
-                    return m.command.find("{sigma}") != std::string::npos;
-                });
-            for (const SweepMethod& method : *methods) identify(firstWord(method.command));
+            std::erase_if(*methods, [&](const SweepMethod& m) {
+                const bool unknown = !reference_ && m.command.find("{sigma}") != std::string::npos;
+                if (unknown) say(m.name + " is left out: its best sigma can only be told with a reference");
+                return unknown;
+            });
+            for (const SweepMethod& method : *methods) {
+                identify(firstWord(method.command));
+                methodFiles_[method.name] = namedFiles(method.command);
+            }
         }
         scene ? prepareScene() : prepareDump();
         if (options_.detailSpp == 0) options_.detailSpp = options_.spp[(options_.spp.size() - 1) / 2];
@@ -428,9 +443,11 @@ class Runner {
         return hex(textHash(command, textHash(inputIdentity_ + programs_.at(firstWord(command)).second)));
     }
 
-    std::string imageKey(const std::string& samplingKey, const std::string& command) const {
-        return hex(textHash(
-            command, textHash(samplingKey + referenceIdentity_ + programs_.at(firstWord(command)).second)));
+    std::string imageKey(const std::string& sampling, const SweepMethod& method,
+                         const std::string& command) const {
+        return hex(textHash(command,
+                            textHash(sampling + referenceIdentity_ + programs_.at(firstWord(command)).second +
+                                     methodFiles_.at(method.name))));
     }
 
     // --- the work
@@ -460,7 +477,7 @@ class Runner {
             record.sampling = sampling;
             record.seed = seed;
             record.command = methodCommand(*method, sampling, seed);
-            record.key = imageKey(key, record.command);
+            record.key = imageKey(key, *method, record.command);
             if (seed == 1 && method->knob.empty()) record.file = "images/" + record.key + ".exr";
             tasks.push_back({method, record});
         }
@@ -698,6 +715,7 @@ class Runner {
     std::optional<ReferenceImage> reference_;
     std::string inputIdentity_, referenceIdentity_;
     std::map<std::string, std::pair<std::string, std::string>> programs_;  // name -> path, identity
+    std::map<std::string, std::string> methodFiles_;                       // by method
     ResultsFile* results_ = nullptr;
     int dumpSamples_ = 0;
     double meanSamples_ = 0;

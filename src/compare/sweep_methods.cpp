@@ -18,8 +18,7 @@ const std::vector<SweepMethod>& builtInMethods() {
 }
 
 const std::vector<std::string>& builtInVariations() {
-    static const std::vector<std::string> variations = {"paper --region 2,6",
-                                                        "paper --no-colour-distance"};
+    static const std::vector<std::string> variations = {"paper --region 2,6", "paper --no-colour-distance"};
     return variations;
 }
 

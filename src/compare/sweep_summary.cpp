@@ -358,9 +358,14 @@ std::string toText(const SweepSummary& summary, const Sweep& sweep) {
         if (const auto slope =
                 series.slopeBySamples.find(sweep.options.reference.empty() ? "predicted_rmse" : "rmse");
             slope != series.slopeBySamples.end()) {
-            std::snprintf(line, sizeof line, "slope of RMSE by samples, %s: %.3f (%.3f to %.3f)\n",
-                          series.name.c_str(), slope->second.value, slope->second.lower, slope->second.upper);
+            std::snprintf(line, sizeof line, "slope of RMSE by samples, %s: %.3f", series.name.c_str(),
+                          slope->second.value);
             text << line;
+            if (std::isfinite(slope->second.lower)) {
+                std::snprintf(line, sizeof line, " (%.3f to %.3f)", slope->second.lower, slope->second.upper);
+                text << line;
+            }
+            text << "\n";
         }
     return text.str();
 }

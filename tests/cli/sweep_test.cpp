@@ -202,6 +202,21 @@ TEST(VlxCompareSweep, FailingMethodIsShownFailing) {
     EXPECT_NE(again.out.find("2 of 5 results were there already"), std::string::npos) << again.out;
 }
 
+TEST(VlxCompareSweep, ReportedStagesAndPlacesOfAnExternalMethod) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    const ToolRun run =
+        sweep({kDump, "-o", out, "--spp", "2", "--seeds", "1", "--methods", "mean", "--no-vary", "--external",
+               "staged=cp {input} {output}; echo '{\"seconds\": {\"predict\": 0.25}, \"spp\": {spp}}'"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const auto all = records(out);
+    ASSERT_EQ(all.size(), 3u);
+    EXPECT_EQ(all[2]["method"], "staged");
+    EXPECT_EQ(all[2]["stages"]["predict"], 0.25);
+    EXPECT_NE(all[2]["command"].get<std::string>().find("\"spp\": 2}"), std::string::npos) << all[2];
+    EXPECT_TRUE(all[1]["stages"].contains("read"));
+}
+
 TEST(VlxCompareSweep, BadInputIsToldBeforeAnythingIsRun) {
     const TemporaryFolder folder;
     const std::string out = folder / "out";

@@ -192,6 +192,9 @@ def use(browser, url, screenshots):
     check(browser.run("return document.documentElement.scrollWidth <= window.innerWidth;"), "the page is not wider than the window")
     if screenshots:
         browser.screenshot(os.path.join(screenshots, "light.png"))
+    browser.cdp("Emulation.setDeviceMetricsOverride", {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    check(browser.run("return document.documentElement.scrollWidth <= 390;"), "nor than a telephone's")
+    browser.cdp("Emulation.clearDeviceMetricsOverride", {})
     browser.cdp("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
     dark = browser.run("return getComputedStyle(document.body).backgroundColor;")
     check(sum(int(v) for v in dark[4:-1].split(",")) < 150, "dark when the reader prefers dark")

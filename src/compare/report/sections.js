@@ -98,6 +98,7 @@ function drawTable(data, state) {
     make('p', { class: 'note' }, 'Small: 95 % intervals over the repetitions. “Averaging needs”: samples, or time, that plain averaging of uniform samples needs to the same error, divided by this setting’s; ~ where averaging was not run to that error and its fitted line was used. “Error by averaging’s”: in the same time. ' +
       'Green and red: better and worse beyond the interval. Bold: on the Pareto front. The average is the tracer’s own image: no reconstruction time is counted for it' +
       (data.imageTimesOnly ? ' otherwise; here the renderer’s time is not known, and the time of averaging the dump is.' : '.') +
+      (data.settings.some((s) => s.values.sigma) ? ' Sigma, in pixels: chosen against the reference, for the least relMSE of each image; a user without one cannot.' : '') +
       ' Peak memory cannot be told below that of the program that measures (some 40 MB).'));
   $('targets').replaceChildren(...data.targets.flatMap((t) => [
     make('strong', {}, `${titleOf(data, t.measure)} of at most ${digits(t.value)}: `),
