@@ -164,11 +164,11 @@ function drawRegion(region) {
   }
   const classes = inspection.classes.filter((c) => c.pairs > 0);
   const far = Math.max(...classes.map((c) => c.distance), ...inspection.cloud.map((p) => p[0])) * 1.03;
-  const tops = classes.map((c) => c.semivariance + (c.standardError ?? 0));
+  const tops = classes.map((c) => c.semivariance + Math.min(c.standardError ?? 0, Math.abs(c.semivariance)));  // longer bars end at the frame
   const sill = inspection.model ? Math.max(...inspection.model.curve.map((p) => p[1])) : 0;
   const sorted = inspection.cloud.map((p) => p[1]).sort((a, b) => a - b);
   const high = Math.max(...tops, Math.min(sill, 2 * Math.max(...tops)), sorted[Math.floor(sorted.length * .9)] ?? 0) * 1.1 || 1;
-  const low = Math.min(0, ...classes.map((c) => c.semivariance - (c.standardError ?? 0)), sorted[Math.floor(sorted.length * .02)] ?? 0);
+  const low = Math.min(0, ...classes.map((c) => c.semivariance), sorted[Math.floor(sorted.length * .02)] ?? 0);
   const chart = axes({ x: { low: 0, high: far, title: inspection.distance }, y: { low, high, title: 'semivariance (squared radiance)' }, label: 'Variogram of the region', height: 380 });
   const clipped = (v) => Math.min(Math.max(v, low), high);
   for (const [h, g] of inspection.cloud) if (g <= high && g >= low) chart.svg.append(draw('circle', { cx: chart.x(h), cy: chart.y(g), r: 1.6, fill: 'var(--soft)', opacity: .45 }));
