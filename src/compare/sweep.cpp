@@ -1,8 +1,5 @@
 #include "variolux/compare/sweep.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 
@@ -19,6 +16,7 @@
 #include <sstream>
 #include <thread>
 
+#include "sweep_store.h"
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/image_io.h"
@@ -35,41 +33,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr std::uintmax_t kHashedWhole = std::uintmax_t{64} << 20;
-constexpr std::size_t kHashedHead = std::size_t{1} << 20;
 constexpr const char* kStddev = "stddev";
-
-std::uint64_t textHash(std::string_view text, std::uint64_t hash = 0) {
-    for (const char c : text) hash = hashOf(hash, static_cast<unsigned char>(c));
-    return hashOf(hash, static_cast<std::uint64_t>(text.size()));
-}
-
-std::string hex(std::uint64_t value) {
-    char text[17];
-    std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-    return text;
-}
-
-/// What tells a file from another (see runSweep).
-std::string fileIdentity(const std::string& path) {
-    struct stat status {};
-    std::ifstream file(path, std::ios::binary);
-    if (!file || ::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode))
-        throw Error(path, "expected a file that can be read");
-    const auto size = static_cast<std::uintmax_t>(status.st_size);
-    std::string head(size <= kHashedWhole ? size : kHashedHead, '\0');
-    file.read(head.data(), static_cast<std::streamsize>(head.size()));
-    if (!file) throw Error(path, "reading failed");
-    std::uint64_t hash = hashOf(size);
-    for (std::size_t i = 0; i + 8 <= head.size(); i += 8) {
-        std::uint64_t word = 0;
-        std::memcpy(&word, head.data() + i, 8);
-        hash = hashOf(hash, word);
-    }
-    hash = textHash(std::string_view(head).substr(head.size() / 8 * 8), hash);
-    if (size > kHashedWhole) hash = hashOf(hash, status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
-    return hex(hash);
-}
 
 std::string filled(std::string text, const std::map<std::string, std::string>& places) {
     for (std::size_t at = text.find('{'); at != std::string::npos; at = text.find('{', at)) {
@@ -108,50 +72,6 @@ std::string samplingText(const SweepSampling& sampling) {
     return sampling.hierarchical ? "tolerance " + numberText(sampling.setting)
                                  : numberText(sampling.setting) + " spp";
 }
-
-/// The folder's results file: held against other sweeps, read once, then added to.
-class ResultsFile {
-  public:
-    explicit ResultsFile(const std::string& path) : path_(path) {
-        fd_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-        if (fd_ < 0) throw Error(path, std::string("cannot be written: ") + std::strerror(errno));
-        if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
-            ::close(fd_);
-            throw Error(path, "another sweep is working in this folder");
-        }
-        std::ifstream file(path, std::ios::binary);
-        std::string line;
-        std::uintmax_t complete = 0;
-        while (std::getline(file, line) && !file.eof()) {  // a line without its end was being written
-            complete += line.size() + 1;
-            const SweepRecord record = parseRecord(line, path);
-            records_[record.key] = record;
-        }
-        if (::ftruncate(fd_, static_cast<off_t>(complete)) != 0 || ::lseek(fd_, 0, SEEK_END) < 0)
-            throw Error(path, std::string("cannot be written: ") + std::strerror(errno));
-    }
-    ~ResultsFile() { ::close(fd_); }
-    ResultsFile(const ResultsFile&) = delete;
-    ResultsFile& operator=(const ResultsFile&) = delete;
-
-    /// The record of this key, if it did not fail.
-    const SweepRecord* find(const std::string& key) const {
-        const auto found = records_.find(key);
-        return found == records_.end() || !found->second.failure.empty() ? nullptr : &found->second;
-    }
-
-    void add(const SweepRecord& record) {
-        const std::string line = toJsonLine(record) + "\n";
-        if (::write(fd_, line.data(), line.size()) != static_cast<ssize_t>(line.size()) || ::fsync(fd_) != 0)
-            throw Error(path_, "writing failed");
-        records_[record.key] = record;
-    }
-
-  private:
-    std::string path_;
-    int fd_;
-    std::map<std::string, SweepRecord> records_;
-};
 
 /// What a program of ours printed with --json.
 Json reportOf(const ProcessRun& run, const std::string& command) {
@@ -440,14 +360,14 @@ class Runner {
     }
 
     std::string samplingKey(const std::string& command) const {
-        return hex(textHash(command, textHash(inputIdentity_ + programs_.at(firstWord(command)).second)));
+        return hexText(textHash(command, textHash(inputIdentity_ + programs_.at(firstWord(command)).second)));
     }
 
     std::string imageKey(const std::string& sampling, const SweepMethod& method,
                          const std::string& command) const {
-        return hex(textHash(command,
-                            textHash(sampling + referenceIdentity_ + programs_.at(firstWord(command)).second +
-                                     methodFiles_.at(method.name))));
+        return hexText(textHash(
+            command, textHash(sampling + referenceIdentity_ + programs_.at(firstWord(command)).second +
+                              methodFiles_.at(method.name))));
     }
 
     // --- the work
@@ -651,7 +571,7 @@ class Runner {
     }
 
     std::string inspectionKey(const SweepRecord& record) const {
-        return hex(textHash(record.key + " inspect " + std::to_string(options_.inspectedRegions)));
+        return hexText(textHash(record.key + " inspect " + std::to_string(options_.inspectedRegions)));
     }
 
     const SweepRecord* doneInspection(const SweepRecord& record) const {

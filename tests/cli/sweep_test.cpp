@@ -1,4 +1,7 @@
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -252,6 +255,17 @@ TEST(VlxCompareSweep, DamagedResultsAreNotOverwritten) {
     EXPECT_NE(run.err.find("results.jsonl: expected a line that a sweep wrote"), std::string::npos)
         << run.err;
     EXPECT_EQ(contents(folder / "out/results.jsonl"), "something else\n");
+}
+
+TEST(VlxCompareSweep, FolderHoldsOneSweepAtATime) {
+    const TemporaryFolder folder;
+    std::filesystem::create_directory(folder / "out");
+    const int held = ::open((folder / "out/results.jsonl").c_str(), O_RDWR | O_CREAT, 0600);
+    ASSERT_EQ(::flock(held, LOCK_EX), 0);
+    const ToolRun run = sweep({kDump, "-o", folder / "out", "--methods", "mean", "--no-vary"});
+    ::close(held);
+    EXPECT_EQ(run.exitCode, 1);
+    EXPECT_NE(run.err.find("another sweep is working in this folder"), std::string::npos) << run.err;
 }
 
 TEST(VlxCompareSweep, BadUsageIsExitTwo) {

@@ -21,7 +21,7 @@ struct PaperOptions {
     /// Join the distance in colour space with the distance on the image plane.
     bool colourDistance = true;
     /// Raster coordinates (x, y) of pixels whose regions are to be inspected (Reconstruction::inspections).
-    std::vector<std::pair<int, int>> inspect;
+    std::vector<std::pair<int, int>> inspect = {};
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
