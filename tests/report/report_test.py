@@ -98,15 +98,15 @@ class Browser:
 
 
 ARROW_DOWN, ARROW_RIGHT, ENTER = "\ue015", "\ue014", "\ue007"
-SETTLE = "await new Promise(r => setTimeout(r, 250));"
+SETTLE = "while (page.viewer && !page.viewer.settled()) await new Promise(r => setTimeout(r, 20));"
 PICTURE = "return document.getElementById('picture').toDataURL();"
 
 
 def use(browser, url, screenshots):
     browser.open(url)
-    for _ in range(100):
-        ready = browser.run("return document.documentElement.dataset.ready === 'yes' && (document.getElementById('images').hidden || "
-                            "document.getElementById('picture').dataset.drawn !== undefined);")
+    for _ in range(600):
+        ready = browser.run("return document.documentElement.dataset.ready === 'yes' && (!page.viewer || page.viewer.settled()) && "
+                            "(!page.inspector || document.getElementById('regions').dataset.region !== undefined);")
         if ready:
             break
         time.sleep(.1)
@@ -154,7 +154,7 @@ def use(browser, url, screenshots):
         third = settled()
         browser.keys("#viewer", "v")
         check(settled() != third, "view: " + browser.run("return document.getElementById('view').selectedOptions[0].textContent;"))
-    browser.run("document.getElementById('reset').click();")
+    browser.run("document.getElementById('reset').click();" + SETTLE)
     box = browser.run("document.getElementById('viewer').scrollIntoView(); const b = document.getElementById('viewer').getBoundingClientRect(); return [b.x, b.y, b.width, b.height];")
     split = browser.run("return page.viewer.state.split;")
     middle = round(box[1] + min(box[3], 600) / 2)

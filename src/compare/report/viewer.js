@@ -146,7 +146,8 @@ function startViewer(data) {
   $('viewer-note').textContent = 'First repetition. Drag the divider; drag the image to pan; wheel (after a click) zooms. Keys, when the image has the focus: arrows, + and -, comma and full stop (divider), e and E (exposure), v (view). Signed errors: full colour at 0.25, less with more exposure. Relative errors: from 0.1 % to 100 %, logarithmic. Error maps: root of the predicted standard deviation, full at 1, less with more exposure. Green pixels are not finite.' +
     (sources[0].image.factor > 1 ? ` Images are reduced ${sources[0].image.factor} times; numbers are not.` : '');
   drawCrops(data, sources, state);
-  return { state, change, render: render() };
+  render();
+  return { state, change, settled: () => Number(picture.dataset.drawn) === latest };
 }
 
 /** Crops of the settings that came nearest to the time of the longest averaging. */
