@@ -1,5 +1,6 @@
 #include "compare_sweep.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -160,6 +161,9 @@ struct SweepCommand {
                                             [&](const SweepMethod& m) { return m.name == name; });
             if (found == known.end())
                 throw CLI::ValidationError("--methods", "no method is called '" + name + "'; see --help");
+            if (std::any_of(options.methods.begin(), options.methods.end(),
+                            [&](const SweepMethod& m) { return m.name == name; }))
+                throw CLI::ValidationError("--methods", "'" + name + "' is there twice");
             options.methods.push_back(*found);
         }
         const auto bad = [](const char* option, const auto& parse) {
@@ -204,6 +208,12 @@ struct SweepCommand {
         for (std::size_t i = 0; i < wanted.size(); ++i)
             if (options.reference.empty() && !wanted[i].measure.starts_with("predicted_"))
                 throw CLI::ValidationError("--target", "'" + wanted[i].measure + "' needs a --reference");
+        const bool dump = std::filesystem::path(options.input).extension() == ".exr";
+        if (dump && (!options.tolerances.empty() || options.width > 0 || options.height > 0 ||
+                     !options.traceArguments.empty()))
+            throw CLI::ValidationError(
+                "--hierarchical, --width, --height and --trace-options go with a scene");
+        if (!dump && options.traceSeconds > 0) throw CLI::ValidationError("--trace-seconds goes with a dump");
         chooseMethods();
         options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
         const ThreadLimit limit(options.threads);

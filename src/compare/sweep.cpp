@@ -212,9 +212,14 @@ class Runner {
             }
         }
         scene ? prepareScene() : prepareDump();
+        sortedOnce(options_.tolerances);
+        sortedOnce(options_.spp);
         if (options_.detailSpp == 0) options_.detailSpp = options_.spp[(options_.spp.size() - 1) / 2];
+        if (std::find(options_.spp.begin(), options_.spp.end(), options_.detailSpp) == options_.spp.end())
+            throw Error("", "expected details of one of the ladder's samples a pixel, found " +
+                                std::to_string(options_.detailSpp));
         for (const int spp : options_.spp) samplings_.push_back({false, static_cast<double>(spp)});
-        if (scene)
+        if (scene)  // the tracer's own way of sampling
             for (const double tolerance : options_.tolerances) samplings_.push_back({true, tolerance});
         sweep_.machine = thisMachine();
         char date[32];
@@ -222,6 +227,12 @@ class Runner {
         std::tm utc{};
         std::strftime(date, sizeof date, "%Y-%m-%d %H:%M UTC", ::gmtime_r(&now, &utc));
         sweep_.date = date;
+    }
+
+    template <typename Value>
+    static void sortedOnce(std::vector<Value>& values) {
+        std::sort(values.begin(), values.end());
+        values.erase(std::unique(values.begin(), values.end()), values.end());
     }
 
     void readReference() {
@@ -560,6 +571,8 @@ class Runner {
         text.erase(text.find_last_not_of(" \n") + 1);
         const std::size_t end = text.rfind('\n');
         if (end != std::string::npos) text = text.substr(end + 1);
+        for (char& c : text)  // a terminal would obey them
+            if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
         return "exit code " + std::to_string(run.exitCode) + (text.empty() ? "" : ": " + text);
     }
 

@@ -83,7 +83,7 @@ SweepSetting settingOf(const Sweep& sweep, const std::string& method, const std:
     for (const std::size_t i : setting.records) {
         const SweepRecord& dump = samplingOf(sweep, record(i));
         setting.samplesPerPixel += dump.samplesPerPixel / n;
-        setting.peakBytes = std::max(setting.peakBytes, own ? dump.peakBytes : record(i).peakBytes);
+        setting.peakBytes = std::max({setting.peakBytes, dump.peakBytes, own ? 0 : record(i).peakBytes});
         for (const auto& [stage, seconds] : dump.stages) setting.stages[stage] += seconds / n;
         if (!own)
             for (const auto& [stage, seconds] : record(i).stages) setting.stages[stage] += seconds / n;

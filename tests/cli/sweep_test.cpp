@@ -242,6 +242,7 @@ TEST(VlxCompareSweep, BadInputIsToldBeforeAnythingIsRun) {
     expectFailure({folder / "text.txt"}, "expected a scene (.glb, .gltf) or a sample dump (.exr)");
     expectFailure({folder / "small.exr"}, "small.exr");
     expectFailure({kDump, "--spp", "9"}, "expected at least 9 samples in every pixel, found 8");
+    expectFailure({kDump, "--spp", "2,4", "--detail-spp", "8"}, "expected details of one of the ladder's");
     expectFailure({kDump, "--external", "mine=no-such-program {input} {output}"},
                   "no-such-program: expected a program that the shell finds");
 }
@@ -291,6 +292,11 @@ TEST(VlxCompareSweep, BadUsageIsExitTwo) {
           {kDump, "-o", out, "--target", "magic=1"},
           {kDump, "-o", out, "--crop", "1,2,3"},
           {kDump, "-o", out, "--trace-seconds", "0"},
+          {kScene, "-o", out, "--trace-seconds", "1"},
+          {kDump, "-o", out, "--hierarchical", "0.1"},
+          {kDump, "-o", out, "--width", "10"},
+          {kDump, "-o", out, "--trace-options", "--max-bounces 1"},
+          {kDump, "-o", out, "--methods", "mean,mean"},
           {kDump, "-o", out, "--nonsense"}}) {
         const ToolRun run = sweep(arguments);
         std::string line;

@@ -32,7 +32,7 @@ struct SweepSetting {
     Interval samplingSeconds;    ///< NaN when it is not known
     Interval imageSeconds;       ///< of the command alone
     Interval cpuSeconds;         ///< processor time of all
-    std::int64_t peakBytes = 0;  ///< of the image's command, most of all repetitions
+    std::int64_t peakBytes = 0;  ///< of the command that needs most, in any repetition
     std::map<std::string, double> stages;  ///< mean wall seconds, sampling's and image's
     std::map<std::string, Interval> values;
     std::optional<Interval> agreement;  ///< predicted_rmse / rmse, with a reference

@@ -82,6 +82,7 @@ function drawTable(data, state) {
   const withValue = (i, text) => make('td', {}, text ?? digits(i?.[0]), make('small', {}, !i || i[1] === null ? '' : `${digits(i[1], 2)} to ${digits(i[2], 2)}`));
   const front = new Set(data.pareto[measure] ?? []);
   const extra = ['psnr', 'ssim', 'bias'].filter((name) => data.settings.some((s) => s.values[name]));
+  if (data.settings.some((s) => s.values.nonfinite?.[0] > 0)) extra.push('nonfinite');
   const rows = data.settings.map((s, i) => make('tr', { class: front.has(i) ? 'best' : null },
     make('td', {}, settingName(s), s.values.sigma ? make('small', {}, `sigma ${digits(s.values.sigma[0])}`) : null,
       s.failures.map((f) => make('small', { class: 'worse' }, `failed: ${f}`))),
@@ -92,7 +93,7 @@ function drawTable(data, state) {
     withValue(s.values.predicted_rmse), withValue(s.agreement)));
   $('table').replaceChildren(make('div', { class: 'scroll' }, make('table', {},
     make('thead', {}, make('tr', {}, ['setting', 'samples a pixel', 'tracing, s', 'reconstruction, s', 'total, s', 'processor, s', 'peak, MB', title,
-      ...extra.map((n) => ({ psnr: 'PSNR, dB', ssim: 'SSIM', bias: 'bias' })[n]), 'averaging needs samples ×', 'averaging needs time ×', 'error by averaging’s',
+      ...extra.map((n) => ({ psnr: 'PSNR, dB', ssim: 'SSIM', bias: 'bias', nonfinite: 'pixels not finite' })[n]), 'averaging needs samples ×', 'averaging needs time ×', 'error by averaging’s',
       'RMSE predicted', 'predicted / actual'].map((t) => make('th', {}, t)))),
     make('tbody', {}, rows))),
     make('p', { class: 'note' }, 'Small: 95 % intervals over the repetitions. “Averaging needs”: samples, or time, that plain averaging of uniform samples needs to the same error, divided by this setting’s; ~ where averaging was not run to that error and its fitted line was used. “Error by averaging’s”: in the same time. ' +
