@@ -7,13 +7,15 @@ namespace vlx {
 
 /// What a command did and what it cost.
 struct ProcessRun {
-    int exitCode = 0;            ///< -signal when a signal ended it; 127: the shell did not find the program
-    double seconds = 0;          ///< wall time from start to end
-    double userSeconds = 0;      ///< processor time of it and all processes that it waited for
-    double systemSeconds = 0;    ///< likewise, in the kernel
-    std::int64_t peakBytes = 0;  ///< resident memory of the largest of these processes
-    std::string out;             ///< standard output
-    std::string err;             ///< the last 4 KiB of standard error
+    int exitCode = 0;          ///< -signal when a signal ended it; 127: the shell did not find the program
+    double seconds = 0;        ///< wall time from start to end
+    double userSeconds = 0;    ///< processor time of it and all processes that it waited for
+    double systemSeconds = 0;  ///< likewise, in the kernel
+    /// Resident memory of the largest of these processes; never less than what this process holds at the
+    /// start, which Linux counts too.
+    std::int64_t peakBytes = 0;
+    std::string out;  ///< standard output
+    std::string err;  ///< the last 4 KiB of standard error
 
     double cpuSeconds() const { return userSeconds + systemSeconds; }
 };

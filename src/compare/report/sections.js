@@ -100,7 +100,7 @@ function drawTable(data, state) {
       'Green and red: better and worse beyond the interval. Bold: on the Pareto front. The average is the tracer’s own image: no reconstruction time is counted for it' +
       (data.imageTimesOnly ? ' otherwise; here the renderer’s time is not known, and the time of averaging the dump is.' : '.') +
       (data.settings.some((s) => s.values.sigma) ? ' Sigma, in pixels: chosen against the reference, for the least relMSE of each image; a user without one cannot.' : '') +
-      ' Peak memory cannot be told below that of the program that measures (some 40 MB).'));
+      ' Peak memory: of the command that needs most; it cannot be told below that of the program that measures (tens of MB).'));
   $('targets').replaceChildren(...data.targets.flatMap((t) => [
     make('strong', {}, `${titleOf(data, t.measure)} of at most ${digits(t.value)}: `),
     t.setting === null ? 'no setting of this sweep. ' : `${settingName(data.settings[t.setting])}, ${digits(data.settings[t.setting].seconds[0])} s. `,
