@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "compare_sweep.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
@@ -111,6 +112,9 @@ radiance. Of a sample dump, its flat beauty part is read.
 
 Exit codes: 0 done; 1 a file cannot be read, compared or written; 2 bad usage;
 3 a limit was passed.
+
+vlx-compare sweep measures what accuracy costs in time and writes a report: see
+vlx-compare sweep --help.
 
 Examples:
   vlx-compare reference.exr mean.exr kriged.exr
@@ -226,6 +230,7 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    if (argc > 1 && std::string(argv[1]) == "sweep") return vlx::sweepMain(argc - 1, argv + 1);
     CLI::App app("Measures images against a reference: error metrics, error maps, pictures side by side.",
                  "vlx-compare");
     Options options;

@@ -30,6 +30,7 @@ struct Options {
     bool noColourDistance = false;
     bool wholeImage = false;
     bool diagnostics = false;
+    std::vector<std::string> inspect;
     bool json = false;
     bool quiet = false;
     int threads = 0;
@@ -89,6 +90,13 @@ void bind(CLI::App& app, Options& o) {
         "--diagnostics", o.diagnostics,
         "paper: also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) "
         "and OUTPUT.json with everything about each region");
+    app.add_option(
+           "--inspect", o.inspect,
+           "With --diagnostics: put the variogram cloud, its classes and cross-validation of the region "
+           "of this pixel into OUTPUT.json; repeatable")
+        ->option_text("X,Y")
+        ->take_all()
+        ->expected(1);
     app.add_flag("--json", o.json, "Print the report as JSON on standard output");
     app.add_flag("-q,--quiet", o.quiet, "Print nothing but errors");
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
@@ -132,10 +140,20 @@ void writeText(const vlx::OutputFile& file, const std::string& text) {
     if (!stream) throw vlx::Error(file.path(), "writing failed");
 }
 
+std::pair<int, int> parsePixel(const std::string& text) {
+    int x = 0, y = 0, end = 0;
+    if (std::sscanf(text.c_str(), "%d,%d%n", &x, &y, &end) != 2 ||
+        static_cast<std::size_t>(end) != text.size())
+        throw CLI::ValidationError("--inspect", "expected X,Y in pixels, found '" + text + "'");
+    return {x, y};
+}
+
 int run(Options& o) {
     o.paper.colourDistance = !o.noColourDistance;
     if (o.wholeImage) o.paper.regionSize = 0;
     o.krige.standardFeatures = !o.noFeatures;
+    if (!o.inspect.empty() && !o.diagnostics) throw CLI::ValidationError("--inspect goes with --diagnostics");
+    for (const std::string& text : o.inspect) o.paper.inspect.push_back(parsePixel(text));
     if (o.method != Method::Paper && (o.diagnostics || o.noColourDistance || o.wholeImage))
         throw CLI::ValidationError(
             "--diagnostics, --no-colour-distance and --whole-image go with --method paper");

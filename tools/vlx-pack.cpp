@@ -8,6 +8,7 @@
 #include "variolux/dump/info.h"
 #include "variolux/dump/points.h"
 #include "variolux/dump/stack.h"
+#include "variolux/dump/subset.h"
 
 namespace {
 
@@ -124,6 +125,43 @@ struct SampleCommand {
     }
 };
 
+struct SubsetCommand {
+    std::string input;
+    std::string dump;
+    vlx::SubsetOptions options;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Write a dump of fewer samples a pixel, as if the renderer had stopped earlier. Where samples "
+            "belong\nto replicates (sample.replicate), whole replicates are kept.");
+        app.footer(
+            "Example: two independent dumps of 4 samples a pixel\n"
+            "  vlx-pack subset room.exr -o room_4a.exr --samples 4\n"
+            "  vlx-pack subset room.exr -o room_4b.exr --samples 4 --part 1");
+        app.add_option("DUMP", input, "The dump to take samples from")->required();
+        app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
+        app.add_option("--samples", options.samples, "Samples a pixel to keep")
+            ->check(CLI::Range(1u, 1u << 24))
+            ->required();
+        app.add_option("--part", options.part,
+                       "Which of the sub-sets of this size; those of one seed share no samples")
+            ->check(CLI::Range(0u, 1u << 24))
+            ->capture_default_str();
+        app.add_option("--seed", options.seed, "Another seed, another division into sub-sets")
+            ->capture_default_str();
+        using enum vlx::DumpCompression;
+        vlx::addChoice(app, "--compression", options.compression,
+                       {{"none", None}, {"rle", Rle}, {"zips", Zips}}, "Of the dump");
+    }
+
+    int run() const {
+        vlx::checkOutputName(dump, {input});
+        vlx::ProgressBar bar("dividing");
+        vlx::subsetDump(input, dump, options, bar);
+        return vlx::kDone;
+    }
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -133,14 +171,18 @@ int main(int argc, char** argv) {
     InfoCommand info;
     StackCommand stack;
     SampleCommand sample;
+    SubsetCommand subset;
     CLI::App* infoApp = app.add_subcommand("info");
     CLI::App* stackApp = app.add_subcommand("stack");
     CLI::App* sampleApp = app.add_subcommand("sample");
+    CLI::App* subsetApp = app.add_subcommand("subset");
     info.bind(*infoApp);
     stack.bind(*stackApp);
     sample.bind(*sampleApp);
+    subset.bind(*subsetApp);
     return vlx::runTool(argc, argv, app, [&] {
         if (infoApp->parsed()) return info.run();
+        if (subsetApp->parsed()) return subset.run();
         return stackApp->parsed() ? stack.run() : sample.run();
     });
 }

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "exr_header.h"
 #include "variolux/dump/reader.h"
@@ -102,9 +103,13 @@ DumpInfo inspectDump(const std::string& path, const Progress& progress) {
     info.fileBytes = reader.fileBytes();
     info.minSamples = std::numeric_limits<std::uint32_t>::max();
     const Window& window = info.header.data;
+    std::vector<std::string> channels = {"R", "G", "B"};
+    if (findChannel(info.header, "sample.replicate") >= 0) channels.emplace_back("sample.replicate");
+    std::set<float> replicates;
     for (int row = 0; row < window.height;) {
         const int rows = std::min(kBandRows, window.height - row);
-        const SampleBand band = reader.read(window.y + row, rows, {"R", "G", "B"});
+        const SampleBand band = reader.read(window.y + row, rows, channels);
+        if (channels.size() > 3) replicates.insert(band.values[3].begin(), band.values[3].end());
         for (std::size_t p = 0; p < band.pixels(); ++p) {
             const auto count = static_cast<std::uint32_t>(band.offsets[p + 1] - band.offsets[p]);
             info.minSamples = std::min(info.minSamples, count);
@@ -119,6 +124,7 @@ DumpInfo inspectDump(const std::string& path, const Progress& progress) {
         row += rows;
         if (progress) progress(row, window.height);
     }
+    info.replicates = static_cast<std::uint32_t>(replicates.size());
     info.meanSamples = static_cast<double>(info.samples) / static_cast<double>(window.pixels());
     std::uint64_t bytesPerSample = 0;
     for (const auto& channel : info.header.channels) bytesPerSample += valueBytes(channel.type);
@@ -184,7 +190,8 @@ std::string toJson(const DumpInfo& info) {
                    {"mean", info.meanSamples},
                    {"max", info.maxSamples},
                    {"emptyPixels", info.emptyPixels},
-                   {"nonFinite", info.nonFiniteSamples}}},
+                   {"nonFinite", info.nonFiniteSamples},
+                   {"replicates", info.replicates}}},
                  {"fileBytes", info.fileBytes},
                  {"rawBytes", info.rawBytes},
                  {"compression", compressionText(header.compression)},

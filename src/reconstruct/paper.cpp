@@ -141,18 +141,22 @@ System assemble(const RegionData& data, const VariogramModel& model, const Momen
 }
 
 /// Section 4: the empirical variogram of the cell means, less their noise, in classes up to the region's
-/// diagonal (a singular value lies beyond it, and is left out), and the stable model fitted to it; near the
-/// origin it matters most, hence the weights.
-VariogramFit fitStableModel(const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours,
-                            const Eigen::VectorXd& errors, const Window& pixels, bool nugget) {
+/// diagonal (a singular value lies beyond it, and is left out).
+EmpiricalVariogram variogramOf(const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours,
+                               const Eigen::VectorXd& errors, const Window& pixels) {
     EmpiricalVariogramOptions classes;
     classes.edges = uniformEdges(std::hypot(pixels.width, pixels.height), kDistanceClasses);
+    return empiricalVariogram(positions, colours, classes, errors);
+}
+
+/// The stable model fitted to it; near the origin it matters most, hence the weights.
+VariogramFit fitStableModel(const EmpiricalVariogram& variogram, bool nugget) {
     FitOptions options;
     options.structures = {{.type = StructureType::Stable, .minShape = kMinExponent, .maxShape = 2}};
     options.nugget = nugget;
     options.weights = FitWeights::PairsPerSquaredDistance;
     options.search = FitSearch::Fast;
-    return fitVariogram(empiricalVariogram(positions, colours, classes, errors), options);
+    return fitVariogram(variogram, options);
 }
 
 /// The region's arithmetic mean everywhere; its error from the samples' noise and what the data vary about
@@ -224,7 +228,7 @@ std::optional<std::string> PaperOptions::validate() const {
     return std::nullopt;
 }
 
-RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) {
+RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, bool inspect) {
     const Eigen::Index pixels = data.pixels.pixels();
     RegionEstimate estimate;
     estimate.values = Eigen::MatrixXd::Zero(pixels, data.means.cols());
@@ -233,6 +237,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     diagnostics.pixels = data.pixels;
     diagnostics.data = data.size();
     diagnostics.samples = data.samples;
+    if (inspect) estimate.inspection.neighbourhood = data.pixels;
     if (data.size() == 0) return estimate;  // RegionOutcome::Empty
 
     const Moments moments(data);
@@ -255,7 +260,17 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
 
     // Samples of the whole image with unknown errors are taken to be exact: nothing is filtered out.
     const bool exact = options.regionSize == 0 && !data.varianceKnown;
-    const VariogramFit fit = fitStableModel(data.positions, differences, moments.errors, data.pixels, !exact);
+    const EmpiricalVariogram variogram =
+        variogramOf(data.positions, differences, moments.errors, data.pixels);
+    const VariogramFit fit = fitStableModel(variogram, !exact);
+    if (inspect) {
+        RegionInspection& inspection = estimate.inspection;
+        inspection.distance = "distance on the image plane, pixels";
+        setVariogram(inspection, variogram, data.positions, differences, moments.errors);
+        if (fit.ok()) inspection.model = fit.model;
+        if (!fit.ok()) inspection.fallbacks.push_back(fit.message());
+        if (fit.rangeAtBound) inspection.fallbacks.emplace_back("the range is at the bound of its search");
+    }
     if (!fit.ok() && fit.status != FitStatus::Zero) {
         useMean(estimate, data, moments, RegionOutcome::FitFailed);
         return estimate;
@@ -270,7 +285,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
         noisy.errorVariances.leftCols(kColours).rowwise() =
             (fit.model.nugget / spread * moments.spread).matrix().transpose();
         noisy.varianceKnown = true;
-        return krigeRegion(noisy, options);
+        return krigeRegion(noisy, options, inspect);
     }
     diagnostics.nugget = fit.model.nugget;
     diagnostics.sill = fit.model.structures.front().sill;
@@ -282,6 +297,11 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options) 
     diagnostics.condition = system.report().conditionEstimate;
     diagnostics.jitter = system.report().jitter;
     const KrigingPrediction prediction = system.predict(assembled.targets, {.weights = true});
+    if (inspect) {
+        estimate.inspection.crossValidation = crossValidate(system, data.means.leftCols(kColours));
+        if (!system.report().message.empty())
+            estimate.inspection.fallbacks.push_back(system.report().message);
+    }
     if (!system.report().ok() || !prediction.estimate.allFinite() || !prediction.variance.allFinite()) {
         useMean(estimate, data, moments, RegionOutcome::SolveFailed);
         return estimate;
@@ -308,13 +328,18 @@ Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& opti
                   : regionsOf(Window{band.x, band.y, band.width, band.height}, options.regionSize);
         std::vector<RegionDiagnostics> diagnostics(regions.size());
         std::vector<std::int64_t> dropped(regions.size()), empty(regions.size());
+        std::vector<std::optional<RegionInspection>> inspections(regions.size());
         parallelFor(0, static_cast<std::int64_t>(regions.size()), [&](std::int64_t i) {
             const auto index = static_cast<std::size_t>(i);
             const RegionData data = gatherRegion(band, channels.layout, regions[index], kCellsPerPixel);
             if (data.size() > kMaxRegionData)
                 throw Error(dump.path(), "a region holds " + std::to_string(data.size()) + " data, at most " +
                                              std::to_string(kMaxRegionData) + " can be kriged together");
-            const RegionEstimate estimate = krigeRegion(data, options);
+            const bool inspect =
+                std::any_of(options.inspect.begin(), options.inspect.end(),
+                            [&](const auto& p) { return regions[index].contains(p.first, p.second); });
+            RegionEstimate estimate = krigeRegion(data, options, inspect);
+            if (inspect) inspections[index] = std::move(estimate.inspection);
             store(estimate, radiance, result.image);
             diagnostics[index] = estimate.diagnostics;
             dropped[index] = data.dropped;
@@ -325,6 +350,7 @@ Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& opti
             result.report.droppedSamples += dropped[i];
             result.report.emptyPixels += empty[i];
             result.report.jitteredSystems += diagnostics[i].jitter > 0 ? 1 : 0;
+            if (inspections[i]) result.inspections[result.regions.size() + i] = std::move(*inspections[i]);
         }
         result.regions.insert(result.regions.end(), diagnostics.begin(), diagnostics.end());
     };

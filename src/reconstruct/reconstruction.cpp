@@ -1,5 +1,8 @@
 #include "variolux/reconstruct/reconstruction.h"
 
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -29,6 +32,76 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
             {"seconds", report.seconds},
             {"readSeconds", report.readSeconds},
             {"solveSeconds", report.solveSeconds}};
+}
+
+/// Five digits: a drawing needs no more, and files stay small.
+nlohmann::ordered_json rounded(double value) {
+    if (!std::isfinite(value)) return nullptr;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.5g", value);
+    return std::strtod(text, nullptr);
+}
+
+std::string_view name(StructureType type) {
+    switch (type) {
+        case StructureType::Spherical:
+            return "spherical";
+        case StructureType::Exponential:
+            return "exponential";
+        case StructureType::Gaussian:
+            return "gaussian";
+        case StructureType::Stable:
+            return "stable";
+        case StructureType::Matern:
+            return "matern";
+        case StructureType::Linear:
+            return "linear";
+    }
+    return "";
+}
+
+nlohmann::ordered_json json(const VariogramModel& model, double reach) {
+    nlohmann::ordered_json document = {{"nugget", rounded(model.nugget)}};
+    auto& structures = document["structures"] = nlohmann::ordered_json::array();
+    for (const VariogramStructure& s : model.structures)
+        structures.push_back({{"type", name(s.type)},
+                              {"sill", rounded(s.sill)},
+                              {"range", rounded(s.range)},
+                              {"shape", rounded(s.shape)}});
+    auto& curve = document["curve"] = nlohmann::ordered_json::array();
+    constexpr int kPoints = 80;
+    for (int i = 0; i <= kPoints; ++i) {
+        const double h = reach * (i + 0.01) / kPoints;  // not 0, where gamma is 0 whatever the nugget
+        curve.push_back({rounded(h), rounded(semivariance(model, h))});
+    }
+    return document;
+}
+
+nlohmann::ordered_json json(const RegionInspection& inspection) {
+    const Window& w = inspection.neighbourhood;
+    nlohmann::ordered_json document = {
+        {"neighbourhood", {{"x", w.x}, {"y", w.y}, {"width", w.width}, {"height", w.height}}},
+        {"distance", inspection.distance},
+        {"pairs", inspection.pairs}};
+    auto& cloud = document["cloud"] = nlohmann::ordered_json::array();
+    for (const auto& [distance, value] : inspection.cloud)
+        cloud.push_back({rounded(distance), rounded(value)});
+    auto& classes = document["classes"] = nlohmann::ordered_json::array();
+    for (const VariogramBin& bin : inspection.classes)
+        classes.push_back({{"distance", rounded(bin.distance)},
+                           {"semivariance", rounded(bin.semivariance)},
+                           {"standardError", rounded(bin.standardError)},
+                           {"pairs", rounded(bin.pairs)}});
+    document["model"] = nullptr;
+    if (!inspection.model.structures.empty())
+        document["model"] =
+            json(inspection.model, inspection.classes.empty() ? 1 : inspection.classes.back().upper);
+    document["crossValidation"] = nullptr;
+    if (const CrossValidation& v = inspection.crossValidation; v.data > 0)
+        document["crossValidation"] = {
+            {"data", v.data}, {"rmse", rounded(v.rmse)}, {"meanSquareScore", rounded(v.meanSquareScore)}};
+    document["fallbacks"] = inspection.fallbacks;
+    return document;
 }
 
 }  // namespace
@@ -85,7 +158,8 @@ std::string toJson(const ReconstructionReport& report) { return json(report).dum
 std::string toJson(const Reconstruction& reconstruction) {
     nlohmann::ordered_json document = {{"report", json(reconstruction.report)}};
     auto& regions = document["regions"] = nlohmann::ordered_json::array();
-    for (const RegionDiagnostics& r : reconstruction.regions)
+    for (std::size_t i = 0; i < reconstruction.regions.size(); ++i) {
+        const RegionDiagnostics& r = reconstruction.regions[i];
         regions.push_back({{"x", r.pixels.x},
                            {"y", r.pixels.y},
                            {"width", r.pixels.width},
@@ -101,6 +175,9 @@ std::string toJson(const Reconstruction& reconstruction) {
                            {"colourScale", r.colourScale},
                            {"condition", r.condition},
                            {"jitter", r.jitter}});
+        if (const auto found = reconstruction.inspections.find(i); found != reconstruction.inspections.end())
+            regions.back()["inspection"] = json(found->second);
+    }
     return document.dump(1);
 }
 

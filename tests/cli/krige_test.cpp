@@ -60,6 +60,41 @@ TEST(VlxKrige, DiagnosticsAreLayersAndJson) {
         EXPECT_GE(image.channel(std::string("diagnostics.") + layer), 0) << layer;
 }
 
+TEST(VlxKrige, InspectedRegionsHaveTheirVariogram) {
+    const TemporaryFolder folder;
+    const ToolRun run = krige(
+        {kDump, "-o", folder / "out.exr", "--diagnostics", "--inspect", "101,121", "--inspect", "119,139"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    std::ifstream file(folder / "out.exr.json");
+    const auto json = nlohmann::json::parse(file);
+    int inspected = 0;
+    for (const auto& region : json["regions"]) {
+        if (!region.contains("inspection")) continue;
+        ++inspected;
+        const auto& i = region["inspection"];
+        EXPECT_EQ(i["neighbourhood"]["x"], region["x"]);
+        EXPECT_LE(i["cloud"].size(), 800u);
+        EXPECT_GE(i["pairs"].get<std::size_t>(), i["cloud"].size());
+        double pairs = 0;
+        for (const auto& c : i["classes"]) pairs += c["pairs"].get<double>();
+        EXPECT_NEAR(pairs, i["pairs"].get<double>(), 1e-3 * pairs);  // the classes hold the whole cloud
+        if (region["outcome"] != "kriged") continue;
+        EXPECT_FALSE(i["model"]["curve"].empty());
+        EXPECT_NEAR(i["model"]["nugget"].get<double>(), region["nugget"].get<double>(),
+                    1e-4 * region["nugget"].get<double>());
+        EXPECT_GT(i["crossValidation"]["meanSquareScore"].get<double>(), 0);
+    }
+    EXPECT_EQ(inspected, 2);
+    // Looking does not change what is seen.
+    ASSERT_EQ(krige({kDump, "-o", folder / "plain.exr"}).exitCode, 0);
+    const Image plain = readImage(folder / "plain.exr"), looked = readImage(folder / "out.exr");
+    for (int row = 0; row < plain.data.height; ++row)
+        for (int col = 0; col < plain.data.width; ++col)
+            for (const auto& channel : plain.channels)
+                ASSERT_EQ(plain.at(col, row)[plain.channel(channel)],
+                          looked.at(col, row)[looked.channel(channel)]);
+}
+
 TEST(VlxKrige, BadUsageIsExitTwo) {
     const TemporaryFolder folder;
     const std::string out = folder / "out.exr";
@@ -73,6 +108,9 @@ TEST(VlxKrige, BadUsageIsExitTwo) {
                                                       {kDump, "-o", out, "--region", "0"},
                                                       {kDump, "-o", out, "--region", "8", "--whole-image"},
                                                       {kDump, "-o", out, "--method", "mean", "--diagnostics"},
+                                                      {kDump, "-o", out, "--inspect", "1,1"},
+                                                      {kDump, "-o", out, "--diagnostics", "--inspect", "1"},
+                                                      {kDump, "-o", out, "--diagnostics", "--inspect", "1,x"},
                                                       {kDump, "-o", out, "--threads", "-1"},
                                                       {kDump, "-o", folder / "out.png"},
                                                       {kDump, "-o", kDump},

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -135,6 +136,31 @@ TEST(VlxPack, StackWithMapAndCompression) {
     EXPECT_EQ(band.values[2][last], 259.0f);
     EXPECT_EQ(band.values[3][last], 259.0f);
     EXPECT_EQ(band.values[4][last], 2.0f);
+}
+
+TEST(VlxPack, SubsetsShareNoSamples) {
+    const TemporaryFolder folder;
+    std::vector<float> seen;
+    for (const char* part : {"0", "1"}) {
+        const ToolRun run = pack(
+            {"subset", kDump, "-o", folder / "part.exr", "--samples", "4", "--part", part, "--seed", "3"});
+        ASSERT_EQ(run.exitCode, 0) << run.err;
+        const DumpReader reader(folder / "part.exr");
+        const SampleBand band = reader.read(120, 1, {"sample.x"});
+        EXPECT_EQ(band.samples(), 80u);
+        seen.insert(seen.end(), band.values[0].begin(), band.values[0].end());
+    }
+    std::vector<float> all = DumpReader(kDump).read(120, 1, {"sample.x"}).values[0];
+    std::sort(all.begin(), all.end());
+    std::sort(seen.begin(), seen.end());
+    EXPECT_EQ(seen, all);
+    const ToolRun many = pack({"subset", kDump, "-o", folder / "no.exr", "--samples", "4", "--part", "2"});
+    EXPECT_EQ(many.exitCode, 1);
+    EXPECT_NE(many.err.find("expected at least 12 samples"), std::string::npos) << many.err;
+    EXPECT_EQ(pack({"subset", kDump, "-o", folder / "no.exr"}).exitCode, 2);
+    EXPECT_EQ(pack({"subset", kDump, "-o", folder / "no.exr", "--samples", "0"}).exitCode, 2);
+    EXPECT_EQ(pack({"subset", kDump, "-o", kDump, "--samples", "1"}).exitCode, 2);
+    EXPECT_EQ(folder.entries(), 1);
 }
 
 TEST(VlxPack, FullDiskLeavesNothing) {

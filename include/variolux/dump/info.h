@@ -27,6 +27,7 @@ struct DumpInfo {
     double meanSamples = 0;
     std::uint64_t emptyPixels = 0;       ///< pixels without samples
     std::uint64_t nonFiniteSamples = 0;  ///< samples with a NaN or infinite R, G or B
+    std::uint32_t replicates = 0;  ///< different values of sample.replicate; 0 without the channel
     std::vector<MissingPart> missing;
 };
 

@@ -2,6 +2,8 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "variolux/base/progress.h"
 #include "variolux/dump/reader.h"
@@ -18,6 +20,8 @@ struct PaperOptions {
     int regionSize = 4;
     /// Join the distance in colour space with the distance on the image plane.
     bool colourDistance = true;
+    /// Raster coordinates (x, y) of pixels whose regions are to be inspected (Reconstruction::inspections).
+    std::vector<std::pair<int, int>> inspect = {};
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
@@ -31,6 +35,7 @@ struct RegionEstimate {
     Eigen::MatrixXd values;  ///< pixels x c, row by row from the region's top left
     Eigen::MatrixXd stddev;  ///< pixels x c: standard deviation of the error
     RegionDiagnostics diagnostics;
+    RegionInspection inspection;  ///< only when asked for
 };
 
 /// Krige one region. The first three columns of `data.means` are R, G, B; they carry the variogram; further
@@ -56,7 +61,8 @@ struct RegionEstimate {
 ///
 /// A region that cannot be kriged gets its mean; `diagnostics.outcome` says why. Never throws for numerical
 /// reasons; every value returned is finite.
-RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options);
+/// With `inspect`, `inspection` tells everything behind the estimate, which is not changed by that.
+RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, bool inspect = false);
 
 /// The method over a whole dump, region by region. Deterministic for any number of threads.
 /// Throws as DumpReader; Error when options are invalid or a region holds more than kMaxRegionData cells.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "variolux/base/image.h"
+#include "variolux/reconstruct/inspection.h"
 
 namespace vlx {
 
@@ -67,7 +68,8 @@ struct Reconstruction {
     /// R, G, B, A when the dump has it, stddev.R, stddev.G, stddev.B: the standard deviation of the
     /// estimate's error; with diagnostics, layers diagnostics.* follow.
     Image image;
-    std::vector<RegionDiagnostics> regions;  ///< row by row; empty for methods without regions
+    std::vector<RegionDiagnostics> regions;               ///< row by row; empty for methods without regions
+    std::map<std::size_t, RegionInspection> inspections;  ///< of regions (by index) where it was asked for
     ReconstructionReport report;
 };
 

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "variolux/base/window.h"
+#include "variolux/geostat/covariance_system.h"
+#include "variolux/geostat/empirical_variogram.h"
+#include "variolux/geostat/variogram_model.h"
+
+namespace vlx {
+
+/// How well each datum is predicted from the others of its kriging system.
+struct CrossValidation {
+    int data = 0;                ///< that can be predicted; none: what follows is 0
+    double rmse = 0;             ///< root mean squared residual, summed over R, G, B
+    double meanSquareScore = 0;  ///< mean of squared residual / its kriging variance: 1 if the model is right
+};
+
+/// Everything behind one region's estimate, to be looked at: what the report's variogram inspector shows. Any
+/// method that works by regions can offer it. As JSON (field "inspection" of a region in vlx-krige's
+/// --diagnostics file; numbers have five digits):
+///
+///     "neighbourhood": {"x", "y", "width", "height"}   pixels whose samples were used
+///     "distance": "pixels"                             what the variogram's distance is, with its unit
+///     "pairs": 7140                                    in the cloud, of which an even choice is kept:
+///     "cloud": [[distance, semivariance], ...]         half squared differences less their noise
+///     "classes": [{"distance", "semivariance", "standardError", "pairs"}, ...]
+///     "model": null, or {"nugget", "structures": [{"type", "sill", "range", "shape"}, ...],
+///                        "curve": [[distance, semivariance], ...]}
+///     "crossValidation": null, or {"data", "rmse", "meanSquareScore"}
+///     "fallbacks": ["...", ...]                        what did not go as planned, in words
+///
+/// Semivariances are summed over R, G, B, in squared radiance.
+struct RegionInspection {
+    Window neighbourhood;
+    std::string distance;
+    std::int64_t pairs = 0;
+    std::vector<std::array<double, 2>> cloud;
+    std::vector<VariogramBin> classes;
+    VariogramModel model{.nugget = 0, .structures = {}};  ///< no structures: none was fitted
+    CrossValidation crossValidation;                      ///< data = 0: there was none
+    std::vector<std::string> fallbacks;
+};
+
+/// Most points of a cloud that are kept.
+inline constexpr std::size_t kCloudPoints = 800;
+
+/// The cloud of data at `positions` (n x d) with `colours` (n x 3) and summed error variances (n), and the
+/// classes of `variogram`, put into `inspection`.
+void setVariogram(RegionInspection& inspection, const EmpiricalVariogram& variogram,
+                  const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours,
+                  const Eigen::VectorXd& errorVariances);
+
+/// Leave-one-out of a kriging system whose first three value columns are `colours` (n x 3).
+CrossValidation crossValidate(const CovarianceSystem& system, const Eigen::MatrixXd& colours);
+
+}  // namespace vlx
