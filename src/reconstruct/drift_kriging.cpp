@@ -460,9 +460,10 @@ class Pipeline {
             const double chosen = known ? mean : value;
             out[c] = static_cast<float>(mean + strength * (chosen - mean));
             if (c >= 3) continue;
-            // Within the models, and between them.
+            // What neighbourhoods share (the noise of their common data), what they differ in, and what models
+            // differ in.
             const double meanVariance = variances_.row(c, y)[x] / std::max(1.f, n);
-            double variance = 0;
+            double variance = sharedVariance(weights, c, x, y);
             for (int j = 0; j <= m; ++j) {
                 const double share = j == 0 ? rest : weights[j - 1];
                 const double within =
@@ -474,6 +475,24 @@ class Pipeline {
             out[radiance_ + c] = static_cast<float>(
                 known ? 0 : std::sqrt(s * variance + (1 - s) * meanVariance));
         }
+    }
+
+    /// Variance of the mean of the two halves' combinations, from their difference, over 5 x 5 pixels.
+    double sharedVariance(const Eigen::VectorXd& weights, int c, int x, int y) const {
+        constexpr int kReach = 2;
+        double sum = 0;
+        int count = 0;
+        for (int row = std::max(0, y - kReach); row <= std::min(height_ - 1, y + kReach); ++row)
+            for (int col = std::max(0, x - kReach); col <= std::min(width_ - 1, x + kReach); ++col) {
+                const auto difference = [&](int j) {
+                    return static_cast<double>(estimate(j, 0, c, col, row)) - estimate(j, 1, c, col, row);
+                };
+                double d = (1 - weights.sum()) * difference(0);
+                for (int j = 1; j <= candidates(); ++j) d += weights[j - 1] * difference(j);
+                sum += d * d / 4;
+                ++count;
+            }
+        return sum / count;
     }
 
     bool isExact(int x, int y) const {
