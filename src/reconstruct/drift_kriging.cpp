@@ -23,22 +23,16 @@ constexpr double kMeanSignificance = 2;  // standard errors by which the plain m
 // Rows kept of everything: a tile row, and all that its stages look ahead and back, rounded up.
 constexpr int kRowsKept = 192;
 
-struct QualityModels {
-    std::vector<NeighbourhoodModel> models;
-    int stride;
-};
-
-QualityModels modelsOf(Quality quality) {
-    const std::vector<NeighbourhoodModel> three = {{13, 2.f}, {5, 1.f}, {8, 0.7f}};
+std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
     switch (quality) {
         case Quality::Draft:
-            return {{{8, 1.f}}, 6};
+            return {{8, 1.f, 6}};
         case Quality::Standard:
-            return {three, 4};
+            break;
         case Quality::High:
-            return {three, 2};
+            return {{13, 2.f, 3}, {5, 1.f, 2}, {8, 0.7f, 2}};
     }
-    return {three, 4};
+    return {{13, 2.f, 6}, {5, 1.f, 4}, {8, 0.7f, 4}};
 }
 
 class Stopwatch {
@@ -63,7 +57,7 @@ class Pipeline {
           progress_(progress),
           layout_(chooseSampleLayout(dump, options)),
           planes_(layout_),
-          quality_(modelsOf(options.quality)),
+          models_(modelsOf(options.quality)),
           width_(dump.header().data.width),
           height_(dump.header().data.height),
           radiance_(layout_.radiance),
@@ -78,11 +72,11 @@ class Pipeline {
                                          " radiance channels, found " + std::to_string(layout_.features) +
                                          " and " + std::to_string(radiance_));
         const EstimatePlanes planes{radiance_};
-        for (std::size_t m = 0; m < quality_.models.size(); ++m) {
+        for (std::size_t m = 0; m < models_.size(); ++m) {
             sums_.emplace_back(width_, planes.channels(), kRowsKept);
             estimates_.emplace_back(width_, 2 * radiance_ + 3, kRowsKept);
         }
-        const int candidates = static_cast<int>(quality_.models.size());  // models but one, and the mean
+        const int candidates = static_cast<int>(models_.size());  // models but one, and the mean
         momentPlanes_ = candidates * (candidates + 1) / 2 + 2 * candidates;
         moments_ = RowRing(width_, momentPlanes_, kRowsKept);
         std::vector<std::string> channels(layout_.names.begin(), layout_.names.begin() + radiance_);
@@ -274,8 +268,7 @@ class Pipeline {
             smooth(y + kTile + kTileMargin);
             TileInput input{&data_, &features_, &variances_,
                             {radiance_, 0, radiance_, 2 * radiance_, 2 * radiance_ + 1},
-                            layout_.features, layout_.group, layout_.groups, width_, height_,
-                            quality_.stride};
+                            layout_.features, layout_.group, layout_.groups, width_, height_};
             // Rows that this tile row is the first to reach.
             for (RowRing& ring : sums_)
                 for (int row = std::max(0, y == 0 ? 0 : y + kMaxReach);
@@ -287,7 +280,7 @@ class Pipeline {
                 parallelFor(0, (tiles + 1 - phase) / 2, [&](std::int64_t i) {
                     const int tile = 2 * static_cast<int>(i) + phase;
                     counts[static_cast<std::size_t>(tile)] =
-                        krigeTile(input, quality_.models, tile * kTile, y, sums_);
+                        krigeTile(input, models_, tile * kTile, y, sums_);
                 });
             ReconstructionReport& report = result_.report;
             for (const NeighbourhoodCounts& of : counts) {
@@ -307,7 +300,7 @@ class Pipeline {
         if (finishedRows_ >= until) return;
         krige(until + kMaxReach);
         parallelFor(finishedRows_, until, [&](std::int64_t y) {
-            for (std::size_t m = 0; m < quality_.models.size(); ++m) finishRow(m, static_cast<int>(y));
+            for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
             momentsRow(static_cast<int>(y));
         });
         finishedRows_ = until;
@@ -339,7 +332,7 @@ class Pipeline {
         }
     }
 
-    int candidates() const { return static_cast<int>(quality_.models.size()); }
+    int candidates() const { return static_cast<int>(models_.size()); }
 
     /// Estimate of a half by model `j`; the last candidate is the half's plain mean.
     float estimate(int j, int half, int c, int x, int y) const {
@@ -509,7 +502,7 @@ class Pipeline {
     const Progress& progress_;
     SampleLayout layout_;
     GatheredPlanes planes_;
-    QualityModels quality_;
+    std::vector<NeighbourhoodModel> models_;
     int width_, height_, radiance_, momentPlanes_ = 0;
     RowRing gathered_;
     RowRing data_;      // means of A, means of B, counts of A, B, both

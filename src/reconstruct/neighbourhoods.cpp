@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include "variolux/geostat/random_drift.h"
 #include "wide.h"
@@ -24,35 +25,46 @@ constexpr int kPriorIterations = 4;
 
 int lanesUp(int n) { return (n + 7) & ~7; }
 
-/// gram[a * rows + b] = sum_i w_i x_a x_b for b <= a. Rows of x are `stride` long, n a multiple of 8 (the rest
-/// zero). Eight partial sums each, added pairwise: the same bits with any vectors.
+/// Eight floats: two registers with SSE, one with AVX; the same sums in both.
+typedef float Lanes __attribute__((vector_size(32)));
+
+/// sums[r * Columns + c] = sum_i a_r,i b_c,i, over n values, a multiple of 8.
+template <int Rows, int Columns>
+inline __attribute__((always_inline)) void dotBlock(const float* a, const float* b, int stride, int n,
+                                                    double* sums) {
+    Lanes sum[Rows][Columns] = {};
+    for (int i = 0; i < n; i += 8) {
+        Lanes x[Rows];
+        for (int r = 0; r < Rows; ++r) std::memcpy(&x[r], a + r * stride + i, sizeof(Lanes));
+        for (int c = 0; c < Columns; ++c) {
+            Lanes y;
+            std::memcpy(&y, b + c * stride + i, sizeof(Lanes));
+            for (int r = 0; r < Rows; ++r) sum[r][c] += x[r] * y;
+        }
+    }
+    for (int r = 0; r < Rows; ++r)
+        for (int c = 0; c < Columns; ++c) {
+            const Lanes& s = sum[r][c];
+            sums[r * Columns + c] = (static_cast<double>(s[0]) + s[4]) + (static_cast<double>(s[1]) + s[5]) +
+                                    ((static_cast<double>(s[2]) + s[6]) + (static_cast<double>(s[3]) + s[7]));
+        }
+}
+
+constexpr int kBlockRows = 4, kBlockColumns = 2;
+
+/// gram[a * rows + b] = sum_i w_i x_a x_b for b <= a. `rows` a multiple of kBlockRows, each `stride` long; n a
+/// multiple of 8 (the rest zero).
 VLX_WIDE void weightedGram(const float* x, const float* w, int rows, int stride, int n, float* weighted,
                            double* gram) {
     for (int a = 0; a < rows; ++a)
         for (int i = 0; i < n; ++i) weighted[a * stride + i] = x[a * stride + i] * w[i];
-    const auto total = [](const float* s) {
-        return (static_cast<double>(s[0]) + s[4]) + (static_cast<double>(s[1]) + s[5]) +
-               ((static_cast<double>(s[2]) + s[6]) + (static_cast<double>(s[3]) + s[7]));
-    };
-    for (int a = 0; a < rows; a += 2)
-        for (int b = 0; b <= a; b += 2) {
-            const int a1 = std::min(a + 1, rows - 1), b1 = std::min(b + 1, rows - 1);
-            const float* __restrict xa = weighted + a * stride;
-            const float* __restrict xa1 = weighted + a1 * stride;
-            const float* __restrict xb = x + b * stride;
-            const float* __restrict xb1 = x + b1 * stride;
-            float s00[8] = {}, s01[8] = {}, s10[8] = {}, s11[8] = {};
-            for (int i = 0; i < n; i += 8)
-                for (int k = 0; k < 8; ++k) {
-                    s00[k] += xa[i + k] * xb[i + k];
-                    s01[k] += xa[i + k] * xb1[i + k];
-                    s10[k] += xa1[i + k] * xb[i + k];
-                    s11[k] += xa1[i + k] * xb1[i + k];
-                }
-            gram[a * rows + b] = total(s00);
-            if (b1 <= a) gram[a * rows + b1] = total(s01);
-            gram[a1 * rows + b] = total(s10);
-            gram[a1 * rows + b1] = total(s11);
+    for (int a = 0; a < rows; a += kBlockRows)
+        for (int b = 0; b < a + kBlockRows; b += kBlockColumns) {
+            double sums[kBlockRows * kBlockColumns];
+            dotBlock<kBlockRows, kBlockColumns>(weighted + a * stride, x + b * stride, stride, n, sums);
+            for (int r = 0; r < kBlockRows; ++r)
+                for (int c = 0; c < kBlockColumns; ++c)
+                    gram[(a + r) * rows + b + c] = sums[r * kBlockColumns + c];
         }
 }
 
@@ -81,12 +93,17 @@ VLX_WIDE void addEstimates(const float* __restrict estimates, const float* __res
 /// One tile's data with their margin, in local planes of kTileSide x kTileSide.
 class Tile {
   public:
-    Tile(const TileInput& input, int x, int y, int reach) : in_(input), x_(x), y_(y), reach_(reach) {
+    /// Takes a tile up; what it needs of memory is kept for the next.
+    void load(const TileInput& input, int x, int y, int reach) {
+        in_ = input;
+        x_ = x;
+        y_ = y;
+        reach_ = reach;
         const int c = input.planes.radiance;
         for (int half = 0; half < 2; ++half) {
             means_[half].resize(planes(c));
             counts_[half].resize(planes(1));
-            errors_[half].resize(planes(1));
+            errors_[half].assign(planes(1), 0.f);
             PatchTile& guide = guides_[half];
             guide.x = x;
             guide.y = y;
@@ -94,12 +111,12 @@ class Tile {
             guide.value.resize(planes(3));
             guide.variance.resize(planes(3));
             for (int k = 0; k < c; ++k)
-                load(*input.data, (half == 0 ? input.planes.meanA : input.planes.meanB) + k,
+                copy(*input.data, (half == 0 ? input.planes.meanA : input.planes.meanB) + k,
                      means_[half].data() + plane(k));
-            load(*input.data, half == 0 ? input.planes.countA : input.planes.countB, counts_[half].data());
+            copy(*input.data, half == 0 ? input.planes.countA : input.planes.countB, counts_[half].data());
             std::copy_n(means_[half].data(), planes(3), guide.value.data());
             for (int k = 0; k < 3; ++k) {
-                load(*input.variances, k, guide.variances(k));
+                copy(*input.variances, k, guide.variances(k));
                 for (std::size_t i = 0; i < plane(1); ++i) {
                     guide.variances(k)[i] /= std::max(1.f, counts_[half][i]);
                     errors_[half][i] += guide.variances(k)[i] / 3;
@@ -110,16 +127,14 @@ class Tile {
         for (std::size_t i = 0; i < references_.size(); ++i)
             references_[i] = std::min(means_[0][i], means_[1][i]);
         features_.resize(planes(2 * input.featureCount));
-        for (int f = 0; f < 2 * input.featureCount; ++f) load(*input.features, f, features_.data() + plane(f));
+        for (int f = 0; f < 2 * input.featureCount; ++f) copy(*input.features, f, features_.data() + plane(f));
 
-        const int side = 2 * reach + 1;
-        std::vector<float> scratch;
         for (int half = 0; half < 2; ++half) {
-            distances_[half].resize(static_cast<std::size_t>(side * side) * kTile * kTile);
+            distances_[half].resize(offsets() * kTile * kTile);
             for (int dy = -reach; dy <= reach; ++dy)
                 for (int dx = -reach; dx <= reach; ++dx)
-                    patchDistances(guides_[half], dx, dy, 1e-12f, scratch,
-                                   distances_[half].data() + offsetPlane(dx, dy));
+                    patchDistances(guides_[half], dx, dy, 1e-12f, scratch_,
+                                   distances_[half].data() + offset(dx, dy) * kTile, offsets() * kTile);
         }
     }
 
@@ -131,7 +146,7 @@ class Tile {
             sums_.assign(planes(out.perHalf()), 0.f);
             for (int row = 0; row < bottom; ++row)
                 for (int col = 0; col < right; ++col) {
-                    const bool regular = (x_ + col) % in_.stride == 0 && (y_ + row) % in_.stride == 0;
+                    const bool regular = (x_ + col) % model.stride == 0 && (y_ + row) % model.stride == 0;
                     if (!regular && covered(model, half, col, row)) continue;
                     counts.own += !regular;
                     krigeCentre(model, half, col, row, counts);
@@ -145,25 +160,26 @@ class Tile {
     static std::size_t plane(int k) { return static_cast<std::size_t>(k) * kTileSide * kTileSide; }
     static std::size_t planes(int k) { return plane(k); }
     static int inner(int col, int row) { return (row + kTileMargin) * kTileSide + col + kTileMargin; }
-    std::size_t offsetPlane(int dx, int dy) const {
-        return static_cast<std::size_t>((dy + reach_) * (2 * reach_ + 1) + dx + reach_) * kTile * kTile;
+    std::size_t offsets() const { return static_cast<std::size_t>((2 * reach_ + 1) * (2 * reach_ + 1)); }
+    std::size_t offset(int dx, int dy) const {
+        return static_cast<std::size_t>((dy + reach_) * (2 * reach_ + 1) + dx + reach_);
     }
-    void load(const RowRing& ring, int k, float* out) const {
+    void copy(const RowRing& ring, int k, float* out) const {
         copyTile(ring, k, x_, y_, in_.width, in_.height, out);
     }
     float distance(int guide, int col, int row, int dx, int dy) const {
-        return distances_[guide][offsetPlane(dx, dy) + static_cast<std::size_t>(row * kTile + col)];
+        return distances_[guide][(static_cast<std::size_t>(row) * offsets() + offset(dx, dy)) * kTile +
+                                 static_cast<std::size_t>(col)];
     }
 
     /// Is the pixel like one of the regular centres around it, and not much less noisy?
     bool covered(const NeighbourhoodModel& model, int half, int col, int row) const {
-        const int left = (x_ + col) % in_.stride, up = (y_ + row) % in_.stride;
+        const int left = (x_ + col) % model.stride, up = (y_ + row) % model.stride;
         const float scale = 1 / (model.tolerance * model.tolerance);
         const auto here = static_cast<std::size_t>(inner(col, row));
-        for (const int dy : {-up, in_.stride - up})
-            for (const int dx : {-left, in_.stride - left}) {
+        for (const int dy : {-up, model.stride - up})
+            for (const int dx : {-left, model.stride - left}) {
                 if (x_ + col + dx >= in_.width || y_ + row + dy >= in_.height) continue;
-                if (std::max(std::abs(dx), std::abs(dy)) > model.reach) continue;
                 const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
                 const float d = distance(1 - half, col, row, dx, dy) * scale;
                 if (counts_[half][there] > 0 && nearExp(std::max(0.f, d)) > kCoveringWeight &&
@@ -175,7 +191,8 @@ class Tile {
 
     void krigeCentre(const NeighbourhoodModel& model, int half, int col, int row, NeighbourhoodCounts& counts) {
         const int reach = model.reach, functions = in_.featureCount + kPositionFunctions;
-        const int channels = in_.planes.radiance, rows = 1 + functions + channels;
+        const int channels = in_.planes.radiance, used = 1 + functions + channels;
+        const int rows = (used + kBlockRows - 1) / kBlockRows * kBlockRows;
         const int stride = lanesUp((2 * reach + 1) * (2 * reach + 1));
         const float scale = 1 / (model.tolerance * model.tolerance);
         const auto centre = static_cast<std::size_t>(inner(col, row));
@@ -237,7 +254,8 @@ class Tile {
                 x[i] = values[index_[static_cast<std::size_t>(i)]] - values[centre];
         }
         weights_.resize(static_cast<std::size_t>(padded), 0.f);
-        for (int r = 0; r < rows; ++r) std::fill(constant + r * stride + n, constant + r * stride + padded, 0.f);
+        for (int r = 0; r < rows; ++r)
+            std::fill(constant + r * stride + (r < used ? n : 0), constant + r * stride + padded, 0.f);
         weighted_.resize(x_values_.size());
         gram_.resize(static_cast<std::size_t>(rows * rows));
         weightedGram(x_values_.data(), weights_.data(), rows, stride, padded, weighted_.data(), gram_.data());
@@ -331,10 +349,10 @@ class Tile {
             }
     }
 
-    const TileInput& in_;
-    int x_, y_, reach_;
+    TileInput in_;
+    int x_ = 0, y_ = 0, reach_ = 0;
     PatchTile guides_[2];
-    std::vector<float> means_[2], counts_[2], errors_[2], distances_[2], references_, features_;
+    std::vector<float> means_[2], counts_[2], errors_[2], distances_[2], references_, features_, scratch_;
 
     // Of the centre at work.
     std::vector<int> index_, used_, group_;
@@ -346,9 +364,10 @@ class Tile {
 
 NeighbourhoodCounts krigeTile(const TileInput& input, const std::vector<NeighbourhoodModel>& models, int x,
                               int y, std::vector<RowRing>& estimates) {
-    int reach = input.stride;  // pixels are compared with the regular centres around them
+    int reach = 0;
     for (const NeighbourhoodModel& model : models) reach = std::max(reach, model.reach);
-    Tile tile(input, x, y, reach);
+    static thread_local Tile tile;  // megabytes: worth keeping
+    tile.load(input, x, y, reach);
     NeighbourhoodCounts counts;
     for (std::size_t m = 0; m < models.size(); ++m) {
         const NeighbourhoodCounts of = tile.krige(models[m], estimates[m]);

@@ -13,6 +13,7 @@ namespace vlx {
 struct NeighbourhoodModel {
     int reach = 8;        ///< pixels along each axis, at most kMaxReach
     float tolerance = 1;  ///< k of w = exp(-d / k^2)
+    int stride = 4;       ///< a centre every so many pixels, at most `reach`
 };
 
 /// Planes of the data that neighbourhoods are made of.
@@ -48,7 +49,6 @@ struct TileInput {
     std::vector<int> group;  ///< of each feature
     int groups = 0;
     int width = 0, height = 0;  ///< of the image
-    int stride = 4;             ///< a neighbourhood's centre every so many pixels
 };
 
 struct NeighbourhoodCounts {

@@ -32,7 +32,7 @@ VLX_WIDE void addDifferences(const float* z1, const float* z2, const float* v1, 
 
 /// Sums over patches: kSpan x kSpan to kTile x kTile.
 VLX_WIDE void sumPatches(const float* __restrict in, float scale, float* __restrict columns,
-                         float* __restrict out) {
+                         float* __restrict out, std::size_t outStride) {
     for (int row = 0; row < kTile; ++row) {
         for (int i = 0; i < kSpan; ++i) {
             float sum = 0;
@@ -42,8 +42,9 @@ VLX_WIDE void sumPatches(const float* __restrict in, float scale, float* __restr
         for (int i = 0; i < kTile; ++i) {
             float sum = 0;
             for (int k = 0; k <= 2 * kPatchRadius; ++k) sum += columns[i + k];
-            out[row * kTile + i] = sum * scale;
+            out[i] = sum * scale;
         }
+        out += outStride;
     }
 }
 
@@ -57,7 +58,7 @@ void copyTile(const RowRing& ring, int plane, int x, int y, int width, int heigh
 }
 
 void patchDistances(const PatchTile& tile, int dx, int dy, float absoluteFloor, std::vector<float>& scratch,
-                    float* out) {
+                    float* out, std::size_t outStride) {
     scratch.assign(kSpan * kSpan + kSpan, 0.f);
     constexpr int kCorner = (kTileMargin - kPatchRadius) * (kTileSide + 1);
     const int shift = dy * kTileSide + dx;
@@ -65,7 +66,7 @@ void patchDistances(const PatchTile& tile, int dx, int dy, float absoluteFloor, 
         addDifferences(tile.values(c) + kCorner, tile.values(c) + kCorner + shift, tile.variances(c) + kCorner,
                        tile.variances(c) + kCorner + shift, absoluteFloor, scratch.data());
     sumPatches(scratch.data(), 1.f / static_cast<float>(kPatchPixels * tile.channels),
-               scratch.data() + kSpan * kSpan, out);
+               scratch.data() + kSpan * kSpan, out, outStride);
 }
 
 }  // namespace vlx

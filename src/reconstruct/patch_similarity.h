@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "row_ring.h"
@@ -36,8 +37,8 @@ void copyTile(const RowRing& ring, int plane, int x, int y, int width, int heigh
 /// For each pixel p of the tile the distance to p + (dx, dy), |dx|, |dy| <= kMaxReach:
 ///     d = mean over patch and channels of ((z1 - z2)^2 - (v1 + min(v1, v2))) / (floor + v1 + v2),
 /// floor = absoluteFloor + 1e-6 (z1^2 + z2^2): a thousandth of the value is no difference. May be negative.
-/// out: kTile * kTile. scratch: any.
+/// Row r of the tile goes to out + r * outStride. scratch: any.
 void patchDistances(const PatchTile& tile, int dx, int dy, float absoluteFloor, std::vector<float>& scratch,
-                    float* out);
+                    float* out, std::size_t outStride = kTile);
 
 }  // namespace vlx
