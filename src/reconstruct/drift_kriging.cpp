@@ -30,9 +30,9 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
         case Quality::Standard:
             break;
         case Quality::High:
-            return {{13, 2.f, 3}, {5, 1.f, 2}, {8, 0.7f, 2}};
+            return {{8, 0.8f, 2}, {15, 3.f, 3}, {4, 1.f, 2}};
     }
-    return {{13, 2.f, 6}, {5, 1.f, 4}, {8, 0.7f, 4}};
+    return {{8, 0.8f, 4}, {15, 3.f, 5}, {4, 1.f, 3}};
 }
 
 class Stopwatch {

@@ -15,8 +15,8 @@ namespace {
 constexpr int kOffsets = 2 * kMaxReach + 1;
 constexpr int kPositionFunctions = 5;      // x, y, x^2, y^2, xy
 constexpr float kLeastWeight = 0.01f;      // of a datum
-constexpr float kCoveringWeight = 0.05f;   // a pixel less like its regular centres gets its own
-constexpr float kCoveringVariance = 0.25f;  // likewise when they are noisier than it by more than this
+constexpr float kCoveringWeight = 0.2f;   // a pixel less like its regular centres gets its own
+constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
 constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
 // than their prefilter says. Twice the standard deviation.

@@ -10,9 +10,9 @@ namespace vlx {
 
 inline constexpr int kTile = 32;                          ///< side of a tile in pixels
 inline constexpr int kPatchRadius = 3;                    ///< patches of 7 x 7 pixels
-inline constexpr int kMaxReach = 13;                      ///< farthest pixel compared, along each axis
+inline constexpr int kMaxReach = 15;                      ///< farthest pixel compared, along each axis
 inline constexpr int kTileMargin = kMaxReach + kPatchRadius;
-inline constexpr int kTileSide = kTile + 2 * kTileMargin;  ///< with the margin: 64
+inline constexpr int kTileSide = kTile + 2 * kTileMargin;  ///< with the margin: 68
 
 /// A tile with its margin, channel by channel; coordinates beyond the image repeat its border.
 struct PatchTile {
