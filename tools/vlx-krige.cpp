@@ -42,38 +42,41 @@ void bind(CLI::App& app, Options& o) {
                    "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
                    "deviation of the error of R, G, B)")
         ->required();
-    vlx::addChoice(app, "--method", o.method,
-                   {{"krige", Method::Krige},
-                    {"paper", Method::Paper},
-                    {"mean", Method::Mean},
-                    {"gaussian", Method::Gaussian}},
-                   "krige: kriging with the features as external drift, in overlapping neighbourhoods; paper: "
-                   "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples; "
-                   "gaussian: the average, Gaussian filtered (no layer stddev)");
-    vlx::addChoice(app, "--quality", o.krige.quality,
-                   {{"draft", vlx::Quality::Draft},
-                    {"standard", vlx::Quality::Standard},
-                    {"high", vlx::Quality::High}},
-                   "krige: draft: one model, sparse neighbourhoods; standard: three models; high: neighbourhoods "
-                   "twice as dense along each axis");
-    vlx::addChoice(app, "--fireflies", o.krige.fireflies,
-                   {{"keep", vlx::Fireflies::Keep},
-                    {"robust", vlx::Fireflies::Robust},
-                    {"clamp", vlx::Fireflies::Clamp}},
-                   "krige: samples far brighter than all around. keep: unbiased and noisy; robust: the brightest "
-                   "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
-                   "What was removed is reported");
+    vlx::addChoice(
+        app, "--method", o.method,
+        {{"krige", Method::Krige},
+         {"paper", Method::Paper},
+         {"mean", Method::Mean},
+         {"gaussian", Method::Gaussian}},
+        "krige: kriging with the features as external drift, in overlapping neighbourhoods; paper: "
+        "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples; "
+        "gaussian: the average, Gaussian filtered (no layer stddev)");
+    vlx::addChoice(
+        app, "--quality", o.krige.quality,
+        {{"draft", vlx::Quality::Draft}, {"standard", vlx::Quality::Standard}, {"high", vlx::Quality::High}},
+        "krige: draft: one model, sparse neighbourhoods; standard: three models; high: neighbourhoods "
+        "twice as dense along each axis");
+    vlx::addChoice(
+        app, "--fireflies", o.krige.fireflies,
+        {{"keep", vlx::Fireflies::Keep},
+         {"robust", vlx::Fireflies::Robust},
+         {"clamp", vlx::Fireflies::Clamp}},
+        "krige: samples far brighter than all around. keep: unbiased and noisy; robust: the brightest "
+        "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
+        "What was removed is reported");
     app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--strength", o.krige.strength, "krige: 0 keeps the plain average, 1 takes the estimate")
         ->check(CLI::Range(0.0, 1.0))
         ->capture_default_str();
-    app.add_option("--feature", o.krige.features,
-                   "krige: a further channel of the dump to use as drift, besides albedo, N and Z; repeatable");
-    app.add_option("--radiance", o.krige.radiance,
-                   "krige: a further channel to estimate with the same weights as R, G, B (a light group): parts "
-                   "still add up; repeatable");
+    app.add_option(
+        "--feature", o.krige.features,
+        "krige: a further channel of the dump to use as drift, besides albedo, N and Z; repeatable");
+    app.add_option(
+        "--radiance", o.krige.radiance,
+        "krige: a further channel to estimate with the same weights as R, G, B (a light group): parts "
+        "still add up; repeatable");
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
     app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
         ->check(CLI::PositiveNumber)

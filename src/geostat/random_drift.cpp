@@ -37,8 +37,7 @@ RandomDrift fitRandomDrift(const DriftMoments& moments, const std::vector<int>& 
         for (Eigen::Index j = 0; j < p; ++j) {
             const auto g = static_cast<std::size_t>(group[static_cast<std::size_t>(j)]);
             explained[g] += std::max(0.0, 1 - drift.precision[g] * drift.covariance(j, j));
-            squares[g] +=
-                drift.coefficients.row(j).head(moments.fitted).squaredNorm() / moments.fitted;
+            squares[g] += drift.coefficients.row(j).head(moments.fitted).squaredNorm() / moments.fitted;
         }
         drift.effective = 0;
         for (const double gamma : explained) drift.effective += gamma;

@@ -17,8 +17,8 @@ namespace vlx {
 namespace {
 
 constexpr int kReadRows = 16;
-constexpr int kFireflyReach = 2;   // pixels: the neighbourhood of a firefly is 5 x 5 pixels
-constexpr int kStackReach = 10;    // pixels: triangular window of 21 x 21 pixels
+constexpr int kFireflyReach = 2;         // pixels: the neighbourhood of a firefly is 5 x 5 pixels
+constexpr int kStackReach = 10;          // pixels: triangular window of 21 x 21 pixels
 constexpr double kMeanSignificance = 2;  // standard errors by which the plain mean must improve
 // Rows kept of everything: a tile row, and all that its stages look ahead and back, rounded up.
 constexpr int kRowsKept = 192;
@@ -48,7 +48,8 @@ class Stopwatch {
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-/// The stages of the reconstruction, each a ring of rows that is filled just ahead of what the next one needs.
+/// The stages of the reconstruction, each a ring of rows that is filled just ahead of what the next one
+/// needs.
 class Pipeline {
   public:
     Pipeline(const DumpReader& dump, const DriftKrigingOptions& options, const Progress& progress)
@@ -179,8 +180,8 @@ class Pipeline {
                     if (c < 3) {
                         const float mean =
                             (data_.row(c, y)[x] * nA + data_.row(radiance_ + c, y)[x] * nB) / (nA + nB);
-                        squares[c] = std::max(
-                            0.f, squares[c] + step * (2 * old + step - 2 * mean) - step * step / n);
+                        squares[c] =
+                            std::max(0.f, squares[c] + step * (2 * old + step - 2 * mean) - step * step / n);
                     }
                     if (half == 0 || single) data_.row(c, y)[x] += step / halfCount;
                     if (half == 1 || single) data_.row(radiance_ + c, y)[x] += step / halfCount;
@@ -199,7 +200,8 @@ class Pipeline {
     float secondBrightest(int x, int y) const {
         float most = 0, second = 0;
         for (int row = std::max(0, y - kFireflyReach); row <= std::min(height_ - 1, y + kFireflyReach); ++row)
-            for (int col = std::max(0, x - kFireflyReach); col <= std::min(width_ - 1, x + kFireflyReach); ++col)
+            for (int col = std::max(0, x - kFireflyReach); col <= std::min(width_ - 1, x + kFireflyReach);
+                 ++col)
                 for (const int plane : {planes_.brightestLuminance, planes_.secondLuminance}) {
                     const float l = gathered_.row(plane, row)[col];
                     if (l > most) {
@@ -223,8 +225,8 @@ class Pipeline {
             if (gathered_.row(planes_.countA, y + dy)[x + dx] == 0) continue;
             ++pairs;
             for (int c = 0; c < 3; ++c) {
-                const float d = gathered_.row(planes_.meanA + c, y)[x] -
-                                gathered_.row(planes_.meanA + c, y + dy)[x + dx];
+                const float d =
+                    gathered_.row(planes_.meanA + c, y)[x] - gathered_.row(planes_.meanA + c, y + dy)[x + dx];
                 sum[c] += 0.5f * d * d;
             }
         }
@@ -266,9 +268,11 @@ class Pipeline {
         while (krigedRows_ < until) {
             const int y = krigedRows_;
             smooth(y + kTile + kTileMargin);
-            TileInput input{&data_, &features_, &variances_,
-                            {radiance_, 0, radiance_, 2 * radiance_, 2 * radiance_ + 1},
-                            layout_.features, layout_.group, layout_.groups, width_, height_};
+            TileInput input{&data_,           &features_,
+                            &variances_,      {radiance_, 0, radiance_, 2 * radiance_, 2 * radiance_ + 1},
+                            layout_.features, layout_.group,
+                            layout_.groups,   width_,
+                            height_};
             // Rows that this tile row is the first to reach.
             for (RowRing& ring : sums_)
                 for (int row = std::max(0, y == 0 ? 0 : y + kMaxReach);
@@ -370,7 +374,8 @@ class Pipeline {
                     std::size_t at = 0;
                     for (int i = 1; i <= m; ++i)
                         for (int j = 1; j <= i; ++j)
-                            sums[at++] += e[static_cast<std::size_t>(i)] * e[static_cast<std::size_t>(j)] * unit;
+                            sums[at++] +=
+                                e[static_cast<std::size_t>(i)] * e[static_cast<std::size_t>(j)] * unit;
                     for (int j = 1; j <= m; ++j) {
                         const double product = e[static_cast<std::size_t>(j)] * other * unit;
                         sums[at++] += product;
@@ -417,7 +422,8 @@ class Pipeline {
         std::int64_t exact = 0;
         for (int x = 0; x < width_; ++x) {
             std::fill(sums.begin(), sums.end(), 0.0);
-            for (int col = std::max(0, x - kStackReach); col <= std::min(width_ - 1, x + kStackReach); ++col) {
+            for (int col = std::max(0, x - kStackReach); col <= std::min(width_ - 1, x + kStackReach);
+                 ++col) {
                 const double weight = (kStackReach + 1 - std::abs(col - x)) * kUnit;
                 for (int k = 0; k < momentPlanes_; ++k)
                     sums[static_cast<std::size_t>(k)] +=
@@ -441,10 +447,10 @@ class Pipeline {
         const bool known = isExact(x, y);
         exact += known;
         for (int c = 0; c < radiance_; ++c) {
-            const double mean = n > 0 ? (nA * data_.row(c, y)[x] + nB * data_.row(radiance_ + c, y)[x]) / (nA + nB) : 0;
+            const double mean =
+                n > 0 ? (nA * data_.row(c, y)[x] + nB * data_.row(radiance_ + c, y)[x]) / (nA + nB) : 0;
             const auto both = [&](int j) {
-                return j == m && n > 0 ? mean
-                                       : 0.5 * (estimate(j, 0, c, x, y) + estimate(j, 1, c, x, y));
+                return j == m && n > 0 ? mean : 0.5 * (estimate(j, 0, c, x, y) + estimate(j, 1, c, x, y));
             };
             const double rest = 1 - weights.sum();
             double value = rest * both(0);
@@ -453,20 +459,21 @@ class Pipeline {
             const double chosen = known ? mean : value;
             out[c] = static_cast<float>(mean + strength * (chosen - mean));
             if (c >= 3) continue;
-            // What neighbourhoods share (the noise of their common data), what they differ in, and what models
-            // differ in.
+            // What neighbourhoods share (the noise of their common data), what they differ in, and what
+            // models differ in.
             const double meanVariance = variances_.row(c, y)[x] / std::max(1.f, n);
             double variance = sharedVariance(weights, c, x, y);
             for (int j = 0; j <= m; ++j) {
                 const double share = j == 0 ? rest : weights[j - 1];
                 const double within =
-                    j == m ? meanVariance : estimates_[static_cast<std::size_t>(j)].row(2 * radiance_ + c, y)[x] / 2;
+                    j == m ? meanVariance
+                           : estimates_[static_cast<std::size_t>(j)].row(2 * radiance_ + c, y)[x] / 2;
                 const double d = both(j) - value;
                 variance += share * (within + d * d);
             }
             const double s = strength;
-            out[radiance_ + c] = static_cast<float>(
-                known ? 0 : std::sqrt(s * variance + (1 - s) * meanVariance));
+            out[radiance_ + c] =
+                static_cast<float>(known ? 0 : std::sqrt(s * variance + (1 - s) * meanVariance));
         }
     }
 
@@ -505,8 +512,8 @@ class Pipeline {
     std::vector<NeighbourhoodModel> models_;
     int width_, height_, radiance_, momentPlanes_ = 0;
     RowRing gathered_;
-    RowRing data_;      // means of A, means of B, counts of A, B, both
-    RowRing squares_;   // sums of squares of R, G, B; their degrees of freedom
+    RowRing data_;     // means of A, means of B, counts of A, B, both
+    RowRing squares_;  // sums of squares of R, G, B; their degrees of freedom
     RowRing features_, variances_;
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: A, B, spread of R, G, B
     RowRing moments_;

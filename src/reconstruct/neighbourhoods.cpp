@@ -15,7 +15,7 @@ namespace {
 constexpr int kOffsets = 2 * kMaxReach + 1;
 constexpr int kPositionFunctions = 5;      // x, y, x^2, y^2, xy
 constexpr float kLeastWeight = 0.01f;      // of a datum
-constexpr float kCoveringWeight = 0.2f;   // a pixel less like its regular centres gets its own
+constexpr float kCoveringWeight = 0.2f;    // a pixel less like its regular centres gets its own
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
 constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
@@ -52,8 +52,8 @@ inline __attribute__((always_inline)) void dotBlock(const float* a, const float*
 
 constexpr int kBlockRows = 4, kBlockColumns = 2;
 
-/// gram[a * rows + b] = sum_i w_i x_a x_b for b <= a. `rows` a multiple of kBlockRows, each `stride` long; n a
-/// multiple of 8 (the rest zero).
+/// gram[a * rows + b] = sum_i w_i x_a x_b for b <= a. `rows` a multiple of kBlockRows, each `stride` long; n
+/// a multiple of 8 (the rest zero).
 VLX_WIDE void weightedGram(const float* x, const float* w, int rows, int stride, int n, float* weighted,
                            double* gram) {
     for (int a = 0; a < rows; ++a)
@@ -127,7 +127,8 @@ class Tile {
         for (std::size_t i = 0; i < references_.size(); ++i)
             references_[i] = std::min(means_[0][i], means_[1][i]);
         features_.resize(planes(2 * input.featureCount));
-        for (int f = 0; f < 2 * input.featureCount; ++f) copy(*input.features, f, features_.data() + plane(f));
+        for (int f = 0; f < 2 * input.featureCount; ++f)
+            copy(*input.features, f, features_.data() + plane(f));
 
         for (int half = 0; half < 2; ++half) {
             distances_[half].resize(offsets() * kTile * kTile);
@@ -189,7 +190,8 @@ class Tile {
         return false;
     }
 
-    void krigeCentre(const NeighbourhoodModel& model, int half, int col, int row, NeighbourhoodCounts& counts) {
+    void krigeCentre(const NeighbourhoodModel& model, int half, int col, int row,
+                     NeighbourhoodCounts& counts) {
         const int reach = model.reach, functions = in_.featureCount + kPositionFunctions;
         const int channels = in_.planes.radiance, used = 1 + functions + channels;
         const int rows = (used + kBlockRows - 1) / kBlockRows * kBlockRows;
@@ -205,7 +207,8 @@ class Tile {
         const float own = std::max(1.f, counts_[half][centre]);
         double noise = 0, total = 0;
         for (int dy = std::max(-reach, -(y_ + row)); dy <= std::min(reach, in_.height - 1 - y_ - row); ++dy)
-            for (int dx = std::max(-reach, -(x_ + col)); dx <= std::min(reach, in_.width - 1 - x_ - col); ++dx) {
+            for (int dx = std::max(-reach, -(x_ + col)); dx <= std::min(reach, in_.width - 1 - x_ - col);
+                 ++dx) {
                 const float alike = nearExp(std::max(0.f, distance(1 - half, col, row, dx, dy) * scale));
                 if (alike < kLeastWeight) continue;
                 const int at = inner(col + dx, row + dy);
@@ -222,7 +225,8 @@ class Tile {
                 p[2 * stride] = px * px;
                 p[3 * stride] = py * py;
                 p[4 * stride] = px * py;
-                noise += static_cast<double>(alike * ratio) * errors_[half][static_cast<std::size_t>(at)] * ratio;
+                noise +=
+                    static_cast<double>(alike * ratio) * errors_[half][static_cast<std::size_t>(at)] * ratio;
                 total += static_cast<double>(alike * ratio);
             }
         if (index_.empty()) return;
@@ -250,8 +254,7 @@ class Tile {
         for (int c = 0; c < channels; ++c) {
             const float* values = means_[half].data() + plane(c);
             float* x = constant + (1 + functions + c) * stride;
-            for (int i = 0; i < n; ++i)
-                x[i] = values[index_[static_cast<std::size_t>(i)]] - values[centre];
+            for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - values[centre];
         }
         weights_.resize(static_cast<std::size_t>(padded), 0.f);
         for (int r = 0; r < rows; ++r)
@@ -298,8 +301,9 @@ class Tile {
                     centred(used_[i], used_[j]) * unit[i] * unit[j] / variance;
             }
             if (used_[i] <= in_.featureCount)
-                moments.normal(a, a) += kFeatureErrorFactor * featureNoise[static_cast<std::size_t>(used_[i] - 1)] *
-                                        unit[i] * unit[i] / variance;
+                moments.normal(a, a) += kFeatureErrorFactor *
+                                        featureNoise[static_cast<std::size_t>(used_[i] - 1)] * unit[i] *
+                                        unit[i] / variance;
             for (int c = 0; c < channels; ++c)
                 moments.right(a, c) = centred(used_[i], 1 + functions + c) * unit[i] / variance;
         }
@@ -309,8 +313,15 @@ class Tile {
 
         // Predict every pixel of the neighbourhood.
         const EstimatePlanes out{channels};
+        // Towards its border a neighbourhood counts less, else its border shows.
         const auto perNoise = static_cast<float>(1 / variance);
-        for (int i = 0; i < n; ++i) weights_[static_cast<std::size_t>(i)] *= perNoise;
+        const float edge = static_cast<float>(reach) / static_cast<float>(reach + 1);
+        const auto taper = [&](float u) {
+            const float v = edge * edge * u * u;
+            return 1 - v * v;
+        };
+        for (int i = 0; i < n; ++i)
+            weights_[static_cast<std::size_t>(i)] *= perNoise * taper(places[i]) * taper(places[stride + i]);
         scatter(weights_.data(), n, sums_.data() + plane(out.weight()));
         estimates_.resize(static_cast<std::size_t>(4 * padded));
         float* const estimate = estimates_.data();
@@ -325,8 +336,8 @@ class Tile {
                 coefficients[static_cast<std::size_t>(used_[i] - 1)] = static_cast<float>(b);
                 offset -= b * gram(used_[i], 0) / total;
             }
-            predictRow(constant + stride, coefficients.data(), functions, stride, n, static_cast<float>(offset),
-                       estimate);
+            predictRow(constant + stride, coefficients.data(), functions, stride, n,
+                       static_cast<float>(offset), estimate);
             const float* references = references_.data() + plane(c);
             for (int i = 0; i < n; ++i) about[i] = references[index_[static_cast<std::size_t>(i)]];
             addEstimates(estimate, about, weights_.data(), n, sum, square);

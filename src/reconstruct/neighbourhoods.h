@@ -6,7 +6,8 @@
 #include "patch_similarity.h"
 #include "row_ring.h"
 
-/// Kriging in overlapping neighbourhoods: the estimates of one tile's centres, added to the pixels they reach.
+/// Kriging in overlapping neighbourhoods: the estimates of one tile's centres, added to the pixels they
+/// reach.
 namespace vlx {
 
 /// How far a neighbourhood reaches and how unlike its patches may be (drift_kriging.h, 3 and 5).
@@ -27,7 +28,7 @@ struct DataPlanes {
 struct EstimatePlanes {
     int radiance = 3;
     int weight() const { return 0; }
-    int sum(int channel) const { return 1 + channel; }             ///< of weight * (estimate - reference)
+    int sum(int channel) const { return 1 + channel; }              ///< of weight * (estimate - reference)
     int square(int colour) const { return 1 + radiance + colour; }  ///< of weight * (estimate - reference)^2
     int perHalf() const { return 1 + radiance + 3; }
     int channels() const { return 2 * perHalf(); }
@@ -58,8 +59,8 @@ struct NeighbourhoodCounts {
     double effective = 0;     ///< sum of effective numbers of drift functions
 };
 
-/// All neighbourhoods centred in the tile at (x, y), of all models and both halves. estimates[m] takes the sums
-/// of model m, over the tile and kMaxReach around it: tiles 2 kTile apart may run at the same time.
+/// All neighbourhoods centred in the tile at (x, y), of all models and both halves. estimates[m] takes the
+/// sums of model m, over the tile and kMaxReach around it: tiles 2 kTile apart may run at the same time.
 NeighbourhoodCounts krigeTile(const TileInput& input, const std::vector<NeighbourhoodModel>& models, int x,
                               int y, std::vector<RowRing>& estimates);
 

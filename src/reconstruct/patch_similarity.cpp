@@ -63,8 +63,9 @@ void patchDistances(const PatchTile& tile, int dx, int dy, float absoluteFloor, 
     constexpr int kCorner = (kTileMargin - kPatchRadius) * (kTileSide + 1);
     const int shift = dy * kTileSide + dx;
     for (int c = 0; c < tile.channels; ++c)
-        addDifferences(tile.values(c) + kCorner, tile.values(c) + kCorner + shift, tile.variances(c) + kCorner,
-                       tile.variances(c) + kCorner + shift, absoluteFloor, scratch.data());
+        addDifferences(tile.values(c) + kCorner, tile.values(c) + kCorner + shift,
+                       tile.variances(c) + kCorner, tile.variances(c) + kCorner + shift, absoluteFloor,
+                       scratch.data());
     sumPatches(scratch.data(), 1.f / static_cast<float>(kPatchPixels * tile.channels),
                scratch.data() + kSpan * kSpan, out, outStride);
 }

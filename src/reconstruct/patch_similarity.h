@@ -8,9 +8,9 @@
 /// Distances between the patches of pixels of a tile, in units of their noise.
 namespace vlx {
 
-inline constexpr int kTile = 32;                          ///< side of a tile in pixels
-inline constexpr int kPatchRadius = 3;                    ///< patches of 7 x 7 pixels
-inline constexpr int kMaxReach = 15;                      ///< farthest pixel compared, along each axis
+inline constexpr int kTile = 32;        ///< side of a tile in pixels
+inline constexpr int kPatchRadius = 3;  ///< patches of 7 x 7 pixels
+inline constexpr int kMaxReach = 15;    ///< farthest pixel compared, along each axis
 inline constexpr int kTileMargin = kMaxReach + kPatchRadius;
 inline constexpr int kTileSide = kTile + 2 * kTileMargin;  ///< with the margin: 68
 

@@ -43,7 +43,8 @@ void measureScales(const DumpReader& dump, SampleLayout& layout, std::size_t fir
     const Window& window = dump.header().data;
     const int rows = std::min(kScaleRows, window.height);
     for (int i = 0; i < rows; ++i) {
-        const auto row = static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(window.height) / (2 * rows));
+        const auto row =
+            static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(window.height) / (2 * rows));
         const SampleBand band = dump.read(window.y + row, 1, channels);
         for (std::size_t c = 0; c < measured; ++c)
             for (const float value : band.values[c])
@@ -52,8 +53,8 @@ void measureScales(const DumpReader& dump, SampleLayout& layout, std::size_t fir
     for (std::size_t c = 0; c < measured; ++c) {
         std::vector<float>& values = magnitudes[c];
         if (values.empty()) continue;
-        const auto nth = values.begin() + static_cast<std::ptrdiff_t>(
-                                              kScalePercentile * static_cast<double>(values.size() - 1));
+        const auto nth = values.begin() + static_cast<std::ptrdiff_t>(kScalePercentile *
+                                                                      static_cast<double>(values.size() - 1));
         std::nth_element(values.begin(), nth, values.end());
         if (*nth > 0) layout.scale[first + c] = *nth;
     }

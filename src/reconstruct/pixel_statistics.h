@@ -57,9 +57,9 @@ struct GatherCounts {
 ///
 /// Halves A and B are the replicates of even and odd number where the dump has replicates, else a random half
 /// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
-/// alike, and may lie on different sides of the pixel. A pixel with one sample has it in both halves. A sample
-/// with a non-finite R, G or B is dropped; other non-finite values count as 0. Sums run in double precision
-/// about the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
+/// alike, and may lie on different sides of the pixel. A pixel with one sample has it in both halves. A
+/// sample with a non-finite R, G or B is dropped; other non-finite values count as 0. Sums run in double
+/// precision about the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
                        int bandRow, double clamp, RowRing& ring, int y);
 

@@ -55,15 +55,15 @@ VLX_WIDE void addWeighted(const float* const* there, const float* const* here, c
 
 }  // namespace
 
-void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, const GatheredPlanes& planes, int x,
-                       int y, int width, int height, RowRing& features) {
+void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, const GatheredPlanes& planes,
+                       int x, int y, int width, int height, RowRing& features) {
     const int right = std::min(width, x + kTile), bottom = std::min(height, y + kTile);
     PatchTile tile{x, y, 0, {}, {}};
     std::vector<float> scratch, distances(kTile * kTile), weights(kTile), raw(kTileSide * kTileSide);
     for (int first = 0; first < layout.features;) {
         int last = first;
-        while (last < layout.features && layout.group[static_cast<std::size_t>(last)] ==
-                                             layout.group[static_cast<std::size_t>(first)])
+        while (last < layout.features &&
+               layout.group[static_cast<std::size_t>(last)] == layout.group[static_cast<std::size_t>(first)])
             ++last;
         const int channels = last - first;
         tile.channels = channels;
@@ -105,8 +105,8 @@ void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, cons
                         s[c] = sums.data() + (2 * c) * kTile * kTile + at;
                         q[c] = sums.data() + (2 * c + 1) * kTile * kTile + at;
                     }
-                    accumulate(distances.data() + at, end - begin, values, variances, channels, weights.data(),
-                               total.data() + at, s, q);
+                    accumulate(distances.data() + at, end - begin, values, variances, channels,
+                               weights.data(), total.data() + at, s, q);
                 }
             }
         for (int c = 0; c < channels; ++c)
@@ -116,8 +116,7 @@ void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, cons
                     const int here = (row - y + kTileMargin) * kTileSide + col - x + kTileMargin;
                     const float w = noisy ? total[at] : 1;
                     const auto plane = static_cast<std::size_t>(2 * c) * kTile * kTile;
-                    features.row(first + c, row)[col] =
-                        noisy ? sums[plane + at] / w : tile.values(c)[here];
+                    features.row(first + c, row)[col] = noisy ? sums[plane + at] / w : tile.values(c)[here];
                     features.row(layout.features + first + c, row)[col] =
                         noisy ? sums[plane + kTile * kTile + at] / (w * w) : 0;
                 }

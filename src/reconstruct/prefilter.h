@@ -14,8 +14,8 @@ inline constexpr int kVarianceReach = 5;  ///< and its error variance
 /// means in each group, weights exp(-d) of patch_similarity.h. Writes the features (planes 0 to f - 1) and
 /// their error variances (f to 2 f - 1: sum w^2 v / (sum w)^2). A group without noise is copied. The error
 /// variance that steers the weights is averaged with that of the 3 x 3 pixels around.
-void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, const GatheredPlanes& planes, int x,
-                       int y, int width, int height, RowRing& features);
+void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, const GatheredPlanes& planes,
+                       int x, int y, int width, int height, RowRing& features);
 
 /// Variance of one sample of R, G, B for the pixels of row y: sum w S / sum w (n - 1) over the pixels within
 /// kVarianceReach, S their sums of squares and n their counts (planes 0 to 2 and 3 of `squares`),

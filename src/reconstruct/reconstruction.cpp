@@ -15,23 +15,23 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
     for (int i = 0; i < kRegionOutcomes; ++i)
         regions[std::string(name(static_cast<RegionOutcome>(i)))] =
             report.regions[static_cast<std::size_t>(i)];
-    return {{"samples", report.samples},
-            {"droppedSamples", report.droppedSamples},
-            {"limitedSamples", report.limitedSamples},
-            {"energyRemoved", report.energyRemoved},
-            {"emptyPixels", report.emptyPixels},
-            {"exactPixels", report.exactPixels},
-            {"regions", regions},
-            {"jitteredSystems", report.jitteredSystems},
-            {"neighbourhoods", report.neighbourhoods},
-            {"ownNeighbourhoods", report.ownNeighbourhoods},
-            {"failedNeighbourhoods", report.failedNeighbourhoods},
-            {"driftFunctions", report.neighbourhoods > 0
-                                   ? report.driftFunctions / static_cast<double>(report.neighbourhoods)
-                                   : 0},
-            {"seconds", report.seconds},
-            {"readSeconds", report.readSeconds},
-            {"solveSeconds", report.solveSeconds}};
+    return {
+        {"samples", report.samples},
+        {"droppedSamples", report.droppedSamples},
+        {"limitedSamples", report.limitedSamples},
+        {"energyRemoved", report.energyRemoved},
+        {"emptyPixels", report.emptyPixels},
+        {"exactPixels", report.exactPixels},
+        {"regions", regions},
+        {"jitteredSystems", report.jitteredSystems},
+        {"neighbourhoods", report.neighbourhoods},
+        {"ownNeighbourhoods", report.ownNeighbourhoods},
+        {"failedNeighbourhoods", report.failedNeighbourhoods},
+        {"driftFunctions",
+         report.neighbourhoods > 0 ? report.driftFunctions / static_cast<double>(report.neighbourhoods) : 0},
+        {"seconds", report.seconds},
+        {"readSeconds", report.readSeconds},
+        {"solveSeconds", report.solveSeconds}};
 }
 
 /// Five digits: a drawing needs no more, and files stay small.

@@ -14,8 +14,8 @@ struct StackingMoments {
 };
 
 /// Weights w >= 0, sum w <= 1 (the base takes the rest), of least sum (y - sum_j w_j e_j)^2 + |w|^2: stacking
-/// with the other half as what is predicted (Breiman, Stacked regressions, 1996). agreement is lowered first by
-/// `significance[j]` standard errors. Coordinate descent, which for a convex problem of this size is exact
+/// with the other half as what is predicted (Breiman, Stacked regressions, 1996). agreement is lowered first
+/// by `significance[j]` standard errors. Coordinate descent, which for a convex problem of this size is exact
 /// enough after 30 rounds.
 Eigen::VectorXd stackingWeights(const StackingMoments& moments, const Eigen::VectorXd& significance);
 

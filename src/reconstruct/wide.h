@@ -1,7 +1,7 @@
 #pragma once
 
-/// Marks a function with long loops over floats: compiled for AVX2 as well, chosen at run time. Files that use
-/// it are compiled without contraction to fused operations, so that both give the same bits. Not under
+/// Marks a function with long loops over floats: compiled for AVX2 as well, chosen at run time. Files that
+/// use it are compiled without contraction to fused operations, so that both give the same bits. Not under
 /// sanitizers, whose instrumented resolvers run before their runtime is ready.
 #if defined(__x86_64__) && !defined(VARIOLUX_SANITIZED)
 #define VLX_WIDE __attribute__((target_clones("avx2", "default")))

@@ -16,19 +16,21 @@
 ///    alike features (radius 5, joint bilateral on the features with their own error variances).
 /// 2. *Drift*: the constant, image coordinates to second order, and the features (albedo, normal, depth, and
 ///    named ones), which are prefiltered where they are noisy (patch similarity with their error variances).
-///    Its coefficients are random with variances estimated in each neighbourhood (geostat/random_drift.h): the
-///    covariance of the field is that of finite rank, and a group of functions that explains nothing costs
-///    nothing.
+///    Its coefficients are random with variances estimated in each neighbourhood (geostat/random_drift.h):
+///    the covariance of the field is that of finite rank, and a group of functions that explains nothing
+///    costs nothing.
 /// 3. *Neighbourhood*: pixels around a centre, every few pixels. A datum's error variance grows with its
-///    composite distance from the centre: v / w, w = exp(-d / k^2), where d compares the colour patches (7 x 7
-///    pixels) of the *other* half with their known noise, so that weights are independent of what they weigh:
+///    composite distance from the centre: v / w, w = exp(-d / k^2), where d compares the colour patches (7 x
+///    7 pixels) of the *other* half with their known noise, so that weights are independent of what they
+///    weigh:
 ///        d = mean over patch and colours of (|dz|^2 - (v1 + min(v1, v2))) / (v1 + v2)
 ///    (Rousselle, Knaus and Zwicker 2012; an unbiased squared distance in units of its noise).
 /// 4. *No seams*: a neighbourhood predicts all its pixels; a pixel averages the predictions of all
 ///    neighbourhoods that hold it, weighted by w over their noise.
-/// 5. *Models*: large and tolerant, medium and strict, small. They and the pixel's plain mean are combined per
-///    pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse, fitted
-///    over about 20 x 20 pixels; the plain mean enters only where it improves by two standard errors.
+/// 5. *Models*: large and tolerant, medium and strict, small. They and the pixel's plain mean are combined
+/// per
+///    pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse,
+///    fitted over about 20 x 20 pixels; the plain mean enters only where it improves by two standard errors.
 /// 6. *Error map*: by the law of total variance. The spread of the neighbourhoods' predictions about their
 ///    mean, halved since two halves are averaged, and the spread of the models about the combination.
 ///
@@ -53,8 +55,8 @@ enum class Fireflies {
 struct DriftKrigingOptions {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;
-    double clamp = 10;     ///< luminance, Fireflies::Clamp; > 0
-    double strength = 1;   ///< 0: the plain mean, 1: the estimate; between: mixed linearly
+    double clamp = 10;                  ///< luminance, Fireflies::Clamp; > 0
+    double strength = 1;                ///< 0: the plain mean, 1: the estimate; between: mixed linearly
     bool standardFeatures = true;       ///< use albedo, N and Z where the dump has them
     std::vector<std::string> features;  ///< further channels to use as drift
     std::vector<std::string> radiance;  ///< further channels to estimate with the same weights (light groups)
@@ -63,11 +65,11 @@ struct DriftKrigingOptions {
     std::optional<std::string> validate() const;
 };
 
-/// Reads the dump once, in bands; memory depends on its width, not its height. Bit-identical for any number of
-/// threads. Every channel gets the same weights: parts that add up to R, G, B still do.
-/// Channels of the image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without
-/// samples is predicted from its neighbours and counted.
-/// Throws as DumpReader; Error when options are invalid or name channels that the dump lacks.
+/// Reads the dump once, in bands; memory depends on its width, not its height. Bit-identical for any number
+/// of threads. Every channel gets the same weights: parts that add up to R, G, B still do. Channels of the
+/// image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without samples is
+/// predicted from its neighbours and counted. Throws as DumpReader; Error when options are invalid or name
+/// channels that the dump lacks.
 Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
                                        const Progress& progress = {});
 
