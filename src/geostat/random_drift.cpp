@@ -11,6 +11,21 @@ namespace {
 constexpr double kLeastPrecision = 1e-6;  // of the start: a prior this wide does not shrink
 constexpr double kMostPrecision = 1e12;   // of the start: a group this tight is out
 
+/// Inverse of the lower triangle of a factor. Plain loops: these matrices are too small for blocks to pay.
+DriftMatrix inverseOf(const DriftMatrix& factor) {
+    const Eigen::Index p = factor.rows();
+    DriftMatrix inverse = DriftMatrix::Zero(p, p);
+    for (Eigen::Index j = 0; j < p; ++j) {
+        inverse(j, j) = 1 / factor(j, j);
+        for (Eigen::Index i = j + 1; i < p; ++i) {
+            double sum = 0;
+            for (Eigen::Index k = j; k < i; ++k) sum += factor(i, k) * inverse(k, j);
+            inverse(i, j) = -sum / factor(i, i);
+        }
+    }
+    return inverse;
+}
+
 }  // namespace
 
 RandomDrift fitRandomDrift(const DriftMoments& moments, const std::vector<int>& group, int groups,
@@ -30,18 +45,22 @@ RandomDrift fitRandomDrift(const DriftMoments& moments, const std::vector<int>& 
             drift.ok = false;
             return drift;
         }
-        drift.covariance = factor.solve(DriftMatrix::Identity(p, p));
-        drift.coefficients.noalias() = drift.covariance * moments.right;
+        const DriftMatrix inverse = inverseOf(factor.matrixLLT());
+        drift.coefficients = inverse.transpose().lazyProduct(inverse.lazyProduct(moments.right).eval());
+        const DriftVector variance = inverse.colwise().squaredNorm().transpose();
 
         std::vector<double> explained(static_cast<std::size_t>(groups)), squares = explained;
         for (Eigen::Index j = 0; j < p; ++j) {
             const auto g = static_cast<std::size_t>(group[static_cast<std::size_t>(j)]);
-            explained[g] += std::max(0.0, 1 - drift.precision[g] * drift.covariance(j, j));
+            explained[g] += std::max(0.0, 1 - drift.precision[g] * variance[j]);
             squares[g] += drift.coefficients.row(j).head(moments.fitted).squaredNorm() / moments.fitted;
         }
         drift.effective = 0;
         for (const double gamma : explained) drift.effective += gamma;
-        if (iteration == iterations) break;
+        if (iteration == iterations) {
+            drift.covariance = inverse.transpose().lazyProduct(inverse);
+            break;
+        }
         for (std::size_t g = 0; g < explained.size(); ++g)
             drift.precision[g] = std::clamp(explained[g] / std::max(squares[g], 1e-300), least, most);
     }
