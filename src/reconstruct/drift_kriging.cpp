@@ -23,16 +23,17 @@ constexpr double kMeanSignificance = 2;  // standard errors by which the plain m
 // Rows kept of everything: a tile row, and all that its stages look ahead and back, rounded up.
 constexpr int kRowsKept = 192;
 
+/// The last one is the small one, which the first is shrunk towards.
 std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
     switch (quality) {
         case Quality::Draft:
-            return {{8, 1.f, 6}};
+            return {{8, 0.8f, 6, true}};
         case Quality::Standard:
             break;
         case Quality::High:
-            return {{8, 0.8f, 2}, {15, 3.f, 3}, {4, 1.f, 2}};
+            return {{8, 0.8f, 3, true}, {15, 3.f, 5, false}, {4, 1.f, 2, false}};
     }
-    return {{8, 0.8f, 4}, {15, 3.f, 5}, {4, 1.f, 3}};
+    return {{8, 0.8f, 6, true}, {15, 3.f, 10, false}, {4, 1.f, 4, false}};
 }
 
 class Stopwatch {
@@ -305,6 +306,7 @@ class Pipeline {
         krige(until + kMaxReach);
         parallelFor(finishedRows_, until, [&](std::int64_t y) {
             for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
+            if (models_.size() > 1) shrinkRow(static_cast<int>(y));
             momentsRow(static_cast<int>(y));
         });
         finishedRows_ = until;
@@ -333,6 +335,26 @@ class Pipeline {
             }
             for (int c = 0; c < 3; ++c)
                 estimates_[m].row(2 * radiance_ + c, y)[x] = static_cast<float>(spread[c] / 2);
+        }
+    }
+
+    /// The first model towards the small one, pixel by pixel: a pixel with unlike features all around is left
+    /// with its own noisy mean, an outlier for one.
+    void shrinkRow(int y) {
+        RowRing &first = estimates_.front(), &small = estimates_.back();
+        for (int x = 0; x < width_; ++x) {
+            double apart = 0, variance = 0;
+            for (int c = 0; c < 3; ++c) {
+                const double a = first.row(c, y)[x], b = first.row(radiance_ + c, y)[x];
+                const double d = (a + b - small.row(c, y)[x] - small.row(radiance_ + c, y)[x]) / 2;
+                apart += d * d;
+                variance += (a - b) * (a - b) / 4;
+            }
+            const auto kept = static_cast<float>(shrinkage(apart, variance));
+            for (int k = 0; k < 2 * radiance_; ++k) {
+                const float towards = small.row(k, y)[x];
+                first.row(k, y)[x] = towards + kept * (first.row(k, y)[x] - towards);
+            }
         }
     }
 
@@ -456,6 +478,8 @@ class Pipeline {
             double value = rest * both(0);
             for (int j = 1; j <= m; ++j) value += weights[j - 1] * both(j);
             const double strength = n > 0 ? options_.strength : 1;
+            // Light is not negative. Parts of light must add up: they are left as they come.
+            if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0) value = std::max(0.0, value);
             const double chosen = known ? mean : value;
             out[c] = static_cast<float>(mean + strength * (chosen - mean));
             if (c >= 3) continue;

@@ -17,6 +17,7 @@ constexpr int kPositionFunctions = 5;      // x, y, x^2, y^2, xy
 constexpr float kLeastWeight = 0.01f;      // of a datum
 constexpr float kCoveringWeight = 0.2f;    // a pixel less like its regular centres gets its own
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
+constexpr float kFeatureWidth2 = 0.04f;    // (a fifth of a feature's scale)^2: as unlike as noise of one
 constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
 // than their prefilter says. Twice the standard deviation.
@@ -173,17 +174,34 @@ class Tile {
                                  static_cast<std::size_t>(col)];
     }
 
+    /// The composite distance of a datum from a centre at (col, row): colour patches of the other half and,
+    /// where the model has them, features with their error variances.
+    float compositeDistance(const NeighbourhoodModel& model, int half, int col, int row, int dx,
+                            int dy) const {
+        const float patches = distance(1 - half, col, row, dx, dy) / (model.tolerance * model.tolerance);
+        float d = std::max(0.f, patches);
+        if (!model.features) return d;
+        const auto here = static_cast<std::size_t>(inner(col, row));
+        const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
+        for (int f = 0; f < in_.featureCount; ++f) {
+            const float* values = features_.data() + plane(f);
+            const float* errors = features_.data() + plane(in_.featureCount + f);
+            const float difference = values[there] - values[here];
+            d += difference * difference / (kFeatureWidth2 + 2 * (errors[here] + errors[there]));
+        }
+        return d;
+    }
+
     /// Is the pixel like one of the regular centres around it, and not much less noisy?
     bool covered(const NeighbourhoodModel& model, int half, int col, int row) const {
         const int left = (x_ + col) % model.stride, up = (y_ + row) % model.stride;
-        const float scale = 1 / (model.tolerance * model.tolerance);
         const auto here = static_cast<std::size_t>(inner(col, row));
         for (const int dy : {-up, model.stride - up})
             for (const int dx : {-left, model.stride - left}) {
                 if (x_ + col + dx >= in_.width || y_ + row + dy >= in_.height) continue;
                 const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
-                const float d = distance(1 - half, col, row, dx, dy) * scale;
-                if (counts_[half][there] > 0 && nearExp(std::max(0.f, d)) > kCoveringWeight &&
+                if (counts_[half][there] > 0 &&
+                    nearExp(compositeDistance(model, half, col, row, dx, dy)) > kCoveringWeight &&
                     errors_[half][here] >= kCoveringVariance * errors_[half][there])
                     return true;
             }
@@ -196,7 +214,6 @@ class Tile {
         const int channels = in_.planes.radiance, used = 1 + functions + channels;
         const int rows = (used + kBlockRows - 1) / kBlockRows * kBlockRows;
         const int stride = lanesUp((2 * reach + 1) * (2 * reach + 1));
-        const float scale = 1 / (model.tolerance * model.tolerance);
         const auto centre = static_cast<std::size_t>(inner(col, row));
 
         index_.clear();
@@ -209,7 +226,7 @@ class Tile {
         for (int dy = std::max(-reach, -(y_ + row)); dy <= std::min(reach, in_.height - 1 - y_ - row); ++dy)
             for (int dx = std::max(-reach, -(x_ + col)); dx <= std::min(reach, in_.width - 1 - x_ - col);
                  ++dx) {
-                const float alike = nearExp(std::max(0.f, distance(1 - half, col, row, dx, dy) * scale));
+                const float alike = nearExp(compositeDistance(model, half, col, row, dx, dy));
                 if (alike < kLeastWeight) continue;
                 const int at = inner(col + dx, row + dy);
                 const float ratio =

@@ -12,9 +12,10 @@ namespace vlx {
 
 /// How far a neighbourhood reaches and how unlike its patches may be (drift_kriging.h, 3 and 5).
 struct NeighbourhoodModel {
-    int reach = 8;        ///< pixels along each axis, at most kMaxReach
-    float tolerance = 1;  ///< k of w = exp(-d / k^2)
-    int stride = 4;       ///< a centre every so many pixels, at most `reach`
+    int reach = 8;          ///< pixels along each axis, at most kMaxReach
+    float tolerance = 1;    ///< k of w = exp(-d / k^2)
+    int stride = 4;         ///< a centre every so many pixels, at most kMaxReach
+    bool features = false;  ///< unlike features weigh a datum down as well
 };
 
 /// Planes of the data that neighbourhoods are made of.

@@ -4,6 +4,10 @@
 
 namespace vlx {
 
+double shrinkage(double apart, double variance) {
+    return apart > variance && apart > 0 ? 1 - variance / apart : 0;
+}
+
 Eigen::VectorXd stackingWeights(const StackingMoments& moments, const Eigen::VectorXd& significance) {
     constexpr int kRounds = 30;
     constexpr double kRidge = 1;  // in units of noise: differences below one standard error decide nothing

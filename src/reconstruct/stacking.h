@@ -13,6 +13,11 @@ struct StackingMoments {
     Eigen::VectorXd standardError;  ///< m: of agreement
 };
 
+/// The share of its difference from another estimate that a noisy estimate keeps, (1 - variance / apart)+:
+/// positive-part James-Stein (1961), with the squared difference `apart` and the estimate's variance summed
+/// over the same channels. 0 where nothing sets them apart.
+double shrinkage(double apart, double variance);
+
 /// Weights w >= 0, sum w <= 1 (the base takes the rest), of least sum (y - sum_j w_j e_j)^2 + |w|^2: stacking
 /// with the other half as what is predicted (Breiman, Stacked regressions, 1996). agreement is lowered first
 /// by `significance[j]` standard errors. Coordinate descent, which for a convex problem of this size is exact

@@ -24,24 +24,30 @@
 ///    7 pixels) of the *other* half with their known noise, so that weights are independent of what they
 ///    weigh:
 ///        d = mean over patch and colours of (|dz|^2 - (v1 + min(v1, v2))) / (v1 + v2)
-///    (Rousselle, Knaus and Zwicker 2012; an unbiased squared distance in units of its noise).
+///    (Rousselle, Knaus and Zwicker 2012; an unbiased squared distance in units of its noise). The medium
+///    model joins the distance of the features, sum over them of df^2 / (0.2^2 + 2 (u1 + u2)), u their error
+///    variances and 1 their scale: noise hides edges from the colours that features show.
 /// 4. *No seams*: a neighbourhood predicts all its pixels; a pixel averages the predictions of all
 ///    neighbourhoods that hold it, weighted by w over their noise.
-/// 5. *Models*: large and tolerant, medium and strict, small. They and the pixel's plain mean are combined
-/// per
-///    pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse,
+/// 5. *Models*: medium and strict, large and tolerant, small. Where few data are like the centre the medium
+///    model keeps their noise: it is shrunk towards the small one by how much of their difference its own
+///    halves' difference explains (positive-part James-Stein). Models and the pixel's plain mean are combined
+///    per pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse,
 ///    fitted over about 20 x 20 pixels; the plain mean enters only where it improves by two standard errors.
 /// 6. *Error map*: by the law of total variance. The spread of the neighbourhoods' predictions about their
 ///    mean, halved since two halves are averaged, and the spread of the models about the combination.
+///
+/// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
+/// (parts of light must add up).
 ///
 /// A pixel whose samples all agree in radiance and in every feature (of at least 2) is exact and stays.
 namespace vlx {
 
 /// What is given up for speed: models used, and how densely neighbourhoods overlap.
 enum class Quality {
-    Draft,     ///< one model, a neighbourhood every 6 pixels
-    Standard,  ///< three models, every 4 pixels
-    High,      ///< three models, every 2 pixels
+    Draft,     ///< the medium model, a neighbourhood every 6 pixels
+    Standard,  ///< three models, every 4 to 10 pixels
+    High,      ///< three models, every 2 to 5 pixels
 };
 
 /// What happens to samples that are brighter than all else around (fireflies).

@@ -51,8 +51,8 @@ struct ReconstructionReport {
     std::int64_t droppedSamples = 0;                      ///< non-finite radiance: left out
     std::int64_t emptyPixels = 0;                         ///< pixels without a usable sample of their own
     std::int64_t jitteredSystems = 0;                     ///< kriging systems that needed jitter
-    std::int64_t exactPixels = 0;           ///< all samples agree: their value, without error
-    std::int64_t limitedSamples = 0;        ///< made darker by the firefly estimator
+    std::int64_t exactPixels = 0;                         ///< all samples agree: their value, without error
+    std::int64_t limitedSamples = 0;                      ///< made darker by the firefly estimator
     double energyRemoved = 0;               ///< share of all samples' luminance that this took away
     std::int64_t neighbourhoods = 0;        ///< kriged (default method), over models and halves
     std::int64_t ownNeighbourhoods = 0;     ///< centred on pixels unlike their regular centres
@@ -60,7 +60,7 @@ struct ReconstructionReport {
     double driftFunctions = 0;              ///< sum over neighbourhoods of the effective number of functions
     std::map<std::string, double> seconds;  ///< wall time by stage (default method)
     double readSeconds = 0;                 ///< wall time in the reader
-    double solveSeconds = 0;                              ///< wall time of everything else
+    double solveSeconds = 0;                ///< wall time of everything else
 };
 
 /// A reconstructed image with what there is to know about it.
