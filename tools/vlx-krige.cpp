@@ -24,6 +24,7 @@ struct Options {
     std::string image;
     Method method = Method::Krige;
     vlx::DriftKrigingOptions krige;
+    std::string band;
     bool noFeatures = false;
     double sigma = 1;
     vlx::PaperOptions paper;
@@ -77,6 +78,11 @@ void bind(CLI::App& app, Options& o) {
         "--radiance", o.krige.radiance,
         "krige: a further channel to estimate with the same weights as R, G, B (a light group): parts "
         "still add up; repeatable");
+    app.add_option(
+           "--band", o.band,
+           "krige: only band I of N, cut by rows from the top: the same pixels, bit for bit, that the "
+           "whole image has there, with its display window")
+        ->option_text("I/N");
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
     app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
         ->check(CLI::PositiveNumber)
@@ -151,10 +157,24 @@ std::pair<int, int> parsePixel(const std::string& text) {
     return {x, y};
 }
 
+vlx::Band parseBand(const std::string& text) {
+    vlx::Band band;
+    int number = 0, end = 0;
+    if (std::sscanf(text.c_str(), "%d/%d%n", &number, &band.count, &end) != 2 ||
+        static_cast<std::size_t>(end) != text.size() || number < 1 || number > band.count)
+        throw CLI::ValidationError("--band", "expected I/N with 1 <= I <= N, found '" + text + "'");
+    band.index = number - 1;
+    return band;
+}
+
 int run(Options& o) {
     o.paper.colourDistance = !o.noColourDistance;
     if (o.wholeImage) o.paper.regionSize = 0;
     o.krige.standardFeatures = !o.noFeatures;
+    if (!o.band.empty()) {
+        if (o.method != Method::Krige) throw CLI::ValidationError("--band goes with --method krige");
+        o.krige.band = parseBand(o.band);
+    }
     if (!o.inspect.empty() && !o.diagnostics) throw CLI::ValidationError("--inspect goes with --diagnostics");
     for (const std::string& text : o.inspect) o.paper.inspect.push_back(parsePixel(text));
     if (o.method != Method::Paper && (o.diagnostics || o.noColourDistance || o.wholeImage))

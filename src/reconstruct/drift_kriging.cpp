@@ -36,6 +36,11 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
     return {{8, 0.8f, 6, true}, {15, 3.f, 10, false}, {4, 1.f, 4, false}};
 }
 
+/// First row of a band of an image of `height` rows.
+int bandRow(const Band& band, int height) {
+    return static_cast<int>(static_cast<std::int64_t>(height) * band.index / band.count);
+}
+
 class Stopwatch {
   public:
     /// Adds the time since the last call (or construction) to `seconds`.
@@ -83,14 +88,24 @@ class Pipeline {
         moments_ = RowRing(width_, momentPlanes_, kRowsKept);
         std::vector<std::string> channels(layout_.names.begin(), layout_.names.begin() + radiance_);
         for (const char* name : {"stddev.R", "stddev.G", "stddev.B"}) channels.emplace_back(name);
-        result_.image = Image(dump.header().data, std::move(channels));
+        Window window = dump.header().data;
+        firstRow_ = bandRow(options.band, window.height);
+        endRow_ = bandRow({options.band.index + 1, options.band.count}, window.height);
+        window.y += firstRow_;
+        window.height = endRow_ - firstRow_;
+        if (window.height == 0)
+            throw Error(dump.path(), "expected at least as many rows as bands, found " +
+                                         std::to_string(height_) + " rows and " +
+                                         std::to_string(options.band.count) + " bands");
+        result_.image = Image(window, std::move(channels));
         result_.image.display = dump.header().display;
+        startAbove(firstRow_);
     }
 
     Reconstruction run() {
-        for (int y = 0; y < height_; y += kTile) {
-            combine(std::min(height_, y + kTile));
-            if (progress_) progress_(std::min(height_, y + kTile), height_);
+        while (combinedRows_ < endRow_) {
+            combine(std::min(endRow_, combinedRows_ + kTile));
+            if (progress_) progress_(combinedRows_ - firstRow_, endRow_ - firstRow_);
         }
         ReconstructionReport& report = result_.report;
         for (const auto& [stage, seconds] : report.seconds)
@@ -99,6 +114,22 @@ class Pipeline {
     }
 
   private:
+    /// Lets each stage start just far enough above row `first` for that row to be what it is in the whole
+    /// image: as far as stages look back, in whole tiles where they work by tiles.
+    void startAbove(int first) {
+        const auto tileAbove = [](int row) { return std::max(0, row) / kTile * kTile; };
+        combinedRows_ = first;
+        finishedRows_ = std::max(0, first - kStackReach);
+        krigedRows_ = tileAbove(finishedRows_ - kMaxReach);
+        zeroedRows_ = std::max(0, krigedRows_ - kMaxReach);
+        varianceRows_ = std::max(0, krigedRows_ - kTileMargin);
+        featureRows_ = tileAbove(varianceRows_ - kVarianceReach);
+        dataRows_ = std::max(0, featureRows_ - kTileMargin);
+        gatheredRows_ = std::max(0, dataRows_ - kFireflyReach);
+    }
+
+    bool own(int y) const { return y >= firstRow_ && y < endRow_; }
+
     // Each stage fills rows up to (not including) `until`, cut to the image, after the stages that it needs.
 
     void gather(int until) {
@@ -115,7 +146,9 @@ class Pipeline {
                               first + static_cast<int>(row));
             });
             ReconstructionReport& report = result_.report;
-            for (const GatherCounts& of : counts) {
+            for (int row = 0; row < rows; ++row) {
+                if (!own(first + row)) continue;
+                const GatherCounts& of = counts[static_cast<std::size_t>(row)];
                 report.samples += of.samples;
                 report.droppedSamples += of.dropped;
                 report.emptyPixels += of.empty;
@@ -144,7 +177,9 @@ class Pipeline {
             Removed& of = removed[static_cast<std::size_t>(y - first)];
             for (int x = 0; x < width_; ++x) limitPixel(x, y, of.samples, of.luminance);
         });
-        for (const Removed& of : removed) {
+        for (int y = first; y < until; ++y) {
+            if (!own(y)) continue;
+            const Removed& of = removed[static_cast<std::size_t>(y - first)];
             result_.report.limitedSamples += of.samples;
             removed_ += of.luminance;
         }
@@ -276,9 +311,9 @@ class Pipeline {
                             height_};
             // Rows that this tile row is the first to reach.
             for (RowRing& ring : sums_)
-                for (int row = std::max(0, y == 0 ? 0 : y + kMaxReach);
-                     row < std::min(height_, y + kTile + kMaxReach); ++row)
+                for (int row = zeroedRows_; row < std::min(height_, y + kTile + kMaxReach); ++row)
                     std::fill_n(ring.row(0, row), width_ * ring.channels(), 0.f);
+            zeroedRows_ = std::min(height_, y + kTile + kMaxReach);
             const int tiles = (width_ + kTile - 1) / kTile;
             std::vector<NeighbourhoodCounts> counts(static_cast<std::size_t>(tiles));
             for (int phase = 0; phase < 2; ++phase)  // tiles of one phase do not reach each other's pixels
@@ -463,7 +498,7 @@ class Pipeline {
 
     void store(int x, int y, const Eigen::VectorXd& weights, std::int64_t& exact) {
         const int m = candidates();
-        float* out = result_.image.at(x, y);
+        float* out = result_.image.at(x, y - firstRow_);
         const float nA = data_.row(2 * radiance_, y)[x], nB = data_.row(2 * radiance_ + 1, y)[x];
         const float n = data_.row(2 * radiance_ + 2, y)[x];
         const bool known = isExact(x, y);
@@ -541,8 +576,9 @@ class Pipeline {
     RowRing features_, variances_;
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: A, B, spread of R, G, B
     RowRing moments_;
+    int firstRow_ = 0, endRow_ = 0;  // of the band
     int gatheredRows_ = 0, dataRows_ = 0, featureRows_ = 0, varianceRows_ = 0, krigedRows_ = 0,
-        finishedRows_ = 0, combinedRows_ = 0;
+        zeroedRows_ = 0, finishedRows_ = 0, combinedRows_ = 0;
     double luminance_ = 0, removed_ = 0;
     Stopwatch watch_;
     Reconstruction result_;
@@ -553,6 +589,9 @@ class Pipeline {
 std::optional<std::string> DriftKrigingOptions::validate() const {
     if (!(strength >= 0 && strength <= 1))
         return "expected a strength of 0 to 1, found " + std::to_string(strength);
+    if (band.count < 1 || band.index < 0 || band.index >= band.count)
+        return "expected a band from 1 to " + std::to_string(band.count) + ", found " +
+               std::to_string(band.index + 1);
     if (fireflies == Fireflies::Clamp && !(clamp > 0 && std::isfinite(clamp)))
         return "expected a luminance above 0 to clamp at, found " + std::to_string(clamp);
     return std::nullopt;

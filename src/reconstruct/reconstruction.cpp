@@ -15,7 +15,7 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
     for (int i = 0; i < kRegionOutcomes; ++i)
         regions[std::string(name(static_cast<RegionOutcome>(i)))] =
             report.regions[static_cast<std::size_t>(i)];
-    return {
+    nlohmann::ordered_json document = {
         {"samples", report.samples},
         {"droppedSamples", report.droppedSamples},
         {"limitedSamples", report.limitedSamples},
@@ -29,9 +29,10 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
         {"failedNeighbourhoods", report.failedNeighbourhoods},
         {"driftFunctions",
          report.neighbourhoods > 0 ? report.driftFunctions / static_cast<double>(report.neighbourhoods) : 0},
-        {"seconds", report.seconds},
         {"readSeconds", report.readSeconds},
         {"solveSeconds", report.solveSeconds}};
+    if (!report.seconds.empty()) document["seconds"] = report.seconds;
+    return document;
 }
 
 /// Five digits: a drawing needs no more, and files stay small.

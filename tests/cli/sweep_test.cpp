@@ -47,9 +47,23 @@ std::string makeReference(const TemporaryFolder& folder) {
 TEST(VlxCompareSweep, OfADumpThenAgainThenInterrupted) {
     const TemporaryFolder folder;
     const std::string reference = makeReference(folder), out = folder / "out";
-    const std::vector<std::string> arguments = {
-        kDump, "-o",        out, "--reference", reference,          "--spp",           "2,4", "--seeds",
-        "2",   "--inspect", "4", "--vary",      "paper --region 3", "--trace-seconds", "8"};
+    const std::vector<std::string> arguments = {kDump,
+                                                "-o",
+                                                out,
+                                                "--reference",
+                                                reference,
+                                                "--spp",
+                                                "2,4",
+                                                "--seeds",
+                                                "2",
+                                                "--inspect",
+                                                "4",
+                                                "--vary",
+                                                "paper --region 3",
+                                                "--trace-seconds",
+                                                "8",
+                                                "--methods",
+                                                "mean,gaussian,paper"};
     const ToolRun first = sweep(arguments);
     ASSERT_EQ(first.exitCode, 0) << first.err;
     EXPECT_NE(first.out.find("0 of "), std::string::npos) << first.out;

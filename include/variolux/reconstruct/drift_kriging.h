@@ -58,6 +58,12 @@ enum class Fireflies {
     Clamp,   ///< samples above a given luminance are scaled down to it: a bias that stays
 };
 
+/// One of `count` bands of nearly equal numbers of rows that an image is cut into, from the top.
+struct Band {
+    int index = 0;  ///< from 0
+    int count = 1;
+};
+
 struct DriftKrigingOptions {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;
@@ -67,6 +73,8 @@ struct DriftKrigingOptions {
     std::vector<std::string> features;  ///< further channels to use as drift
     std::vector<std::string> radiance;  ///< further channels to estimate with the same weights (light groups)
 
+    Band band;  ///< only these rows: the pixels that they have in the whole image, bit for bit
+
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
 };
@@ -74,8 +82,8 @@ struct DriftKrigingOptions {
 /// Reads the dump once, in bands; memory depends on its width, not its height. Bit-identical for any number
 /// of threads. Every channel gets the same weights: parts that add up to R, G, B still do. Channels of the
 /// image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without samples is
-/// predicted from its neighbours and counted. Throws as DumpReader; Error when options are invalid or name
-/// channels that the dump lacks.
+/// predicted from its neighbours and counted. Throws as DumpReader; Error when options are invalid, name
+/// channels that the dump lacks or more bands than it has rows.
 Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
                                        const Progress& progress = {});
 
