@@ -18,8 +18,9 @@ namespace {
 
 constexpr int kReadRows = 16;
 constexpr int kFireflyReach = 2;         // pixels: the neighbourhood of a firefly is 5 x 5 pixels
+constexpr int kHoleReach = 5;            // pixels: how far a pixel without samples looks for some
 constexpr int kStackReach = 10;          // pixels: triangular window of 21 x 21 pixels
-constexpr double kMeanSignificance = 2;  // standard errors by which the plain mean must improve
+constexpr double kMeanSignificance = 1;  // standard errors by which the plain mean must improve
 // Rows kept of everything: a tile row, and all that its stages look ahead and back, rounded up.
 constexpr int kRowsKept = 192;
 
@@ -125,7 +126,7 @@ class Pipeline {
         varianceRows_ = std::max(0, krigedRows_ - kTileMargin);
         featureRows_ = tileAbove(varianceRows_ - kVarianceReach);
         dataRows_ = std::max(0, featureRows_ - kTileMargin);
-        gatheredRows_ = std::max(0, dataRows_ - kFireflyReach);
+        gatheredRows_ = std::max(0, dataRows_ - kHoleReach);
     }
 
     bool own(int y) const { return y >= firstRow_ && y < endRow_; }
@@ -165,7 +166,7 @@ class Pipeline {
     void limit(int until) {
         until = std::min(until, height_);
         if (dataRows_ >= until) return;
-        gather(until + kFireflyReach);
+        gather(until + kHoleReach);
         const int first = dataRows_;
         struct Removed {
             std::int64_t samples = 0;
@@ -175,7 +176,10 @@ class Pipeline {
         parallelFor(first, until, [&](std::int64_t line) {
             const int y = static_cast<int>(line);
             Removed& of = removed[static_cast<std::size_t>(y - first)];
-            for (int x = 0; x < width_; ++x) limitPixel(x, y, of.samples, of.luminance);
+            for (int x = 0; x < width_; ++x) {
+                if (gathered_.row(planes_.count, y)[x] == 0) fillHole(x, y);
+                limitPixel(x, y, of.samples, of.luminance);
+            }
         });
         for (int y = first; y < until; ++y) {
             if (!own(y)) continue;
@@ -186,6 +190,25 @@ class Pipeline {
         result_.report.energyRemoved = luminance_ > 0 ? removed_ / luminance_ : 0;
         dataRows_ = until;
         watch_.addTo(result_.report.seconds["statistics"]);
+    }
+
+    /// A pixel without samples gets the means and features of the nearest one that has some, so that it is
+    /// alike to what is around it. Its counts stay 0: it is predicted, but is no datum.
+    void fillHole(int x, int y) {
+        int nearest = kHoleReach * kHoleReach + 1, fromX = -1, fromY = -1;
+        for (int row = std::max(0, y - kHoleReach); row <= std::min(height_ - 1, y + kHoleReach); ++row)
+            for (int col = std::max(0, x - kHoleReach); col <= std::min(width_ - 1, x + kHoleReach); ++col) {
+                const int distance = (col - x) * (col - x) + (row - y) * (row - y);
+                if (distance >= nearest || gathered_.row(planes_.count, row)[col] == 0) continue;
+                nearest = distance;
+                fromX = col;
+                fromY = row;
+            }
+        if (fromX < 0) return;
+        for (const auto& [first, planes] :
+             {std::pair{planes_.meanA, 2 * radiance_}, {planes_.feature, 2 * layout_.features}})
+            for (int k = first; k < first + planes; ++k)
+                gathered_.row(k, y)[x] = gathered_.row(k, fromY)[fromX];
     }
 
     void limitPixel(int x, int y, std::int64_t& samples, double& luminance) {
@@ -401,16 +424,20 @@ class Pipeline {
                                  : estimates_[static_cast<std::size_t>(j)].row(half * radiance_ + c, y)[x];
     }
 
-    /// Variance of the mean of half of a pixel's samples, averaged over colours; never 0.
+    /// Variance of the mean of half of a pixel's samples, averaged over colours; never 0, nor so small beside
+    /// the candidates that their squares in units of it are no floats.
     double halfVariance(int x, int y) const {
         double variance = 0, level = 0;
         const float n = data_.row(2 * radiance_ + 2, y)[x];
         for (int c = 0; c < 3; ++c) {
             variance += 2 * variances_.row(c, y)[x] / std::max(1.f, n) / 3;
-            const double value = estimate(0, 0, c, x, y);
-            level += value * value;
+            for (int j = 0; j <= candidates(); ++j)
+                for (int half = 0; half < 2; ++half) {
+                    const double value = estimate(j, half, c, x, y);
+                    level = std::max(level, value * value);
+                }
         }
-        return variance + 1e-8 * level + 1e-12;
+        return variance + 1e-8 * level + 1e-300;
     }
 
     void momentsRow(int y) {

@@ -19,9 +19,11 @@ constexpr float kCoveringWeight = 0.2f;    // a pixel less like its regular cent
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
 constexpr float kFeatureWidth2 = 0.04f;    // (a fifth of a feature's scale)^2: as unlike as noise of one
 constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
+constexpr float kLeastCountRatio = 1e-3f;  // a pixel without samples: predicted, and next to no datum
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
 // than their prefilter says. Twice the standard deviation.
 constexpr double kFeatureErrorFactor = 4;
+constexpr float kLeastSquare = 1e-30f;  // of radiance, or of its noise
 constexpr int kPriorIterations = 4;
 
 int lanesUp(int n) { return (n + 7) & ~7; }
@@ -135,7 +137,7 @@ class Tile {
             distances_[half].resize(offsets() * kTile * kTile);
             for (int dy = -reach; dy <= reach; ++dy)
                 for (int dx = -reach; dx <= reach; ++dx)
-                    patchDistances(guides_[half], dx, dy, 1e-12f, scratch_,
+                    patchDistances(guides_[half], dx, dy, kLeastSquare, scratch_,
                                    distances_[half].data() + offset(dx, dy) * kTile, offsets() * kTile);
         }
     }
@@ -229,9 +231,8 @@ class Tile {
                 const float alike = nearExp(compositeDistance(model, half, col, row, dx, dy));
                 if (alike < kLeastWeight) continue;
                 const int at = inner(col + dx, row + dy);
-                const float ratio =
-                    std::min(kMostCountRatio, counts_[half][static_cast<std::size_t>(at)] / own);
-                if (ratio <= 0) continue;
+                const float ratio = std::clamp(counts_[half][static_cast<std::size_t>(at)] / own,
+                                               kLeastCountRatio, kMostCountRatio);
                 const std::size_t i = index_.size();
                 index_.push_back(at);
                 weights_.push_back(alike * ratio);
@@ -292,7 +293,7 @@ class Tile {
             spread += std::max(0.0, centred(1 + functions + c, 1 + functions + c)) / total / 3;
             level += value * value;
         }
-        const double variance = std::max(noise / total, 1e-10 * level + 1e-20);
+        const double variance = std::max(noise / total, 1e-10 * level + kLeastSquare);
         used_.clear();
         group_.clear();
         std::array<double, kMaxRandomDrift> unit{};
@@ -334,8 +335,8 @@ class Tile {
         const auto perNoise = static_cast<float>(1 / variance);
         const float edge = static_cast<float>(reach) / static_cast<float>(reach + 1);
         const auto taper = [&](float u) {
-            const float v = edge * edge * u * u;
-            return 1 - v * v;
+            const float v = 1 - edge * edge * u * u;
+            return v * v;
         };
         for (int i = 0; i < n; ++i)
             weights_[static_cast<std::size_t>(i)] *= perNoise * taper(places[i]) * taper(places[stride + i]);

@@ -67,13 +67,14 @@ struct Band {
 struct DriftKrigingOptions {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;
-    double clamp = 10;                  ///< luminance, Fireflies::Clamp; > 0
-    double strength = 1;                ///< 0: the plain mean, 1: the estimate; between: mixed linearly
-    bool standardFeatures = true;       ///< use albedo, N and Z where the dump has them
-    std::vector<std::string> features;  ///< further channels to use as drift
-    std::vector<std::string> radiance;  ///< further channels to estimate with the same weights (light groups)
+    double clamp = 10;                       ///< luminance, Fireflies::Clamp; > 0
+    double strength = 1;                     ///< 0: the plain mean, 1: the estimate; between: mixed linearly
+    bool standardFeatures = true;            ///< use albedo, N and Z where the dump has them
+    std::vector<std::string> features = {};  ///< further channels to use as drift
+    std::vector<std::string> radiance =
+        {};  ///< further channels to estimate with the same weights (light groups)
 
-    Band band;  ///< only these rows: the pixels that they have in the whole image, bit for bit
+    Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;

@@ -1,0 +1,364 @@
+#include "variolux/reconstruct/drift_kriging.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include "../base/temporary_folder.h"
+#include "variolux/base/error.h"
+#include "variolux/base/parallel.h"
+#include "variolux/dump/writer.h"
+#include "variolux/reconstruct/mean.h"
+
+namespace vlx {
+namespace {
+
+/// A made-up picture: what it truly shows, and samples of it.
+struct Picture {
+    Window window{-7, 11, 70, 61};
+    int spp = 8;
+    double noise = 0.5;  ///< standard deviation of a sample, of the signal
+    bool features = true;
+    unsigned seed = 1;
+    /// Truth of R; G and B are 0.7 and 0.4 of it.
+    std::function<double(int, int)> truth = [](int x, int y) { return (x + y > 40 ? 0.9 : 0.3) + 0.004 * x; };
+    std::function<double(int, int)> albedo = [](int x, int y) { return x + y > 40 ? 0.8 : 0.2; };
+
+    SampleBand samples() const {
+        SampleBand band{window.x, window.y, window.width, window.height, {0}, {"R", "G", "B"}, {}};
+        if (features)
+            for (const char* c : {"albedo.R", "albedo.G", "albedo.B"}) band.channels.emplace_back(c);
+        band.values.resize(band.channels.size());
+        std::mt19937 random(seed);
+        std::normal_distribution<double> normal;
+        for (int y = window.y; y < window.y + window.height; ++y)
+            for (int x = window.x; x < window.x + window.width; ++x) {
+                for (int s = 0; s < spp; ++s) {
+                    const double z = truth(x, y) * (1 + noise * normal(random));
+                    for (int c = 0; c < 3; ++c)
+                        band.values[static_cast<std::size_t>(c)].push_back(
+                            static_cast<float>(z * (1 - 0.3 * c)));
+                    for (std::size_t c = 3; c < band.values.size(); ++c)
+                        band.values[c].push_back(static_cast<float>(albedo(x, y)));
+                }
+                band.offsets.push_back(band.values[0].size());
+            }
+        return band;
+    }
+
+    /// Mean squared relative error of R.
+    double error(const Image& image) const {
+        double sum = 0;
+        for (int row = 0; row < window.height; ++row)
+            for (int col = 0; col < window.width; ++col) {
+                const double z = truth(window.x + col, window.y + row);
+                const double d = static_cast<double>(image.at(col, row)[0]) - z;
+                sum += d * d / (z * z);
+            }
+        return sum / static_cast<double>(window.pixels());
+    }
+};
+
+class DriftKriging : public testing::Test {
+  protected:
+    void write(const SampleBand& band) {
+        DumpHeader header;
+        header.data = header.display = {band.x, band.y, band.width, band.height};
+        for (const std::string& channel : band.channels)
+            header.channels.push_back({channel, ChannelType::Float});
+        DumpWriter writer(folder_ / "a.exr", header);
+        writer.write(band);
+        writer.close();
+    }
+    Reconstruction krige(const DriftKrigingOptions& options = {}) const {
+        return reconstructDriftKriging(DumpReader(folder_ / "a.exr"), options);
+    }
+    Image mean() const { return reconstructMean(DumpReader(folder_ / "a.exr")).image; }
+
+    TemporaryFolder folder_;
+};
+
+TEST_F(DriftKriging, SamePixelsForAnyNumberOfThreads) {
+    write(Picture{}.samples());
+    Image first;
+    for (const int threads : {1, 2, 3, 8}) {
+        const ThreadLimit limit(threads);
+        const Image image = krige().image;
+        if (threads == 1) first = image;
+        EXPECT_EQ(image.pixels, first.pixels) << threads;
+    }
+}
+
+TEST_F(DriftKriging, BandsAreTheWholeImage) {
+    Picture picture;
+    picture.window = {3, -20, 40, 333};  // rows leave the rings that hold them
+    picture.truth = [](int x, int y) { return 1 + 0.5 * std::sin(0.1 * y) + (x > 20); };
+    write(picture.samples());
+    const Reconstruction whole = krige();
+    for (const int count : {2, 5}) {
+        int row = 0;
+        std::int64_t samples = 0;
+        for (int i = 0; i < count; ++i) {
+            const Reconstruction band = krige({.band = {i, count}});
+            const Image& image = band.image;
+            EXPECT_EQ(image.data.y, -20 + row);
+            EXPECT_EQ(image.display, whole.image.display);
+            const auto from =
+                whole.image.pixels.begin() + static_cast<std::ptrdiff_t>(row) * image.data.width *
+                                                 static_cast<std::ptrdiff_t>(image.channelCount());
+            EXPECT_TRUE(std::equal(image.pixels.begin(), image.pixels.end(), from)) << i << " of " << count;
+            row += image.data.height;
+            samples += band.report.samples;
+        }
+        EXPECT_EQ(row, 333);
+        EXPECT_EQ(samples, whole.report.samples);
+    }
+}
+
+TEST_F(DriftKriging, FeaturesCarryEdgesThroughTheNoise) {
+    Picture picture;
+    picture.noise = 1;
+    write(picture.samples());
+    const double plain = picture.error(mean()), with = picture.error(krige().image);
+    const double without = picture.error(krige({.standardFeatures = false}).image);
+    EXPECT_NEAR(plain, 1.0 / 8, 0.02);
+    EXPECT_LT(with, plain / 25);
+    EXPECT_LT(without, plain / 4);  // the colours show the edge as well, less clearly
+    EXPECT_LT(with, without);
+}
+
+TEST_F(DriftKriging, ErrorFallsAtLeastLikeTheMeansAndStaysBelowIt) {
+    // A picture that no feature explains and no polynomial follows: steps of one pixel.
+    Picture picture;
+    picture.features = false;
+    picture.truth = [](int x, int y) { return 1 + 0.6 * ((x / 3 + y / 2) % 2); };
+    double ratio = 1;
+    for (const int spp : {8, 64, 512}) {
+        picture.spp = spp;
+        write(picture.samples());
+        const double now = picture.error(krige().image) / picture.error(mean());
+        EXPECT_LT(now, 1.05) << spp;
+        EXPECT_LT(now, 1.5 * ratio) << spp;
+        ratio = now;
+    }
+}
+
+TEST_F(DriftKriging, ErrorMapCoversTheError) {
+    Picture picture;
+    picture.window = {0, 0, 96, 96};
+    picture.truth = [](int x, int y) { return 1 + 0.5 * std::sin(0.05 * x) * std::cos(0.04 * y); };
+    picture.albedo = [](int, int) { return 0.5; };
+    for (const int spp : {8, 32, 128}) {
+        picture.spp = spp;
+        picture.seed = static_cast<unsigned>(spp);
+        write(picture.samples());
+        const Image image = krige().image;
+        int one = 0, two = 0, count = 0;
+        for (int row = 0; row < 96; ++row)
+            for (int col = 0; col < 96; ++col) {
+                const float* pixel = image.at(col, row);
+                const double z = std::abs(static_cast<double>(pixel[0]) - picture.truth(col, row)) /
+                                 static_cast<double>(pixel[image.channel("stddev.R")]);
+                one += z < 1;
+                two += z < 2;
+                ++count;
+            }
+        // Errors of neighbours are alike: 96 x 96 pixels are some hundred independent ones, 4 % each way.
+        EXPECT_GT(static_cast<double>(one) / count, 0.56) << spp;
+        EXPECT_LT(static_cast<double>(one) / count, 0.88) << spp;
+        EXPECT_GT(static_cast<double>(two) / count, 0.88) << spp;
+    }
+}
+
+TEST_F(DriftKriging, NoSeamsAtTilesAndCentres) {
+    // Mean squared second differences across the columns of a lattice, divided by those across all others.
+    constexpr int kLattices[] = {4, 6, 10, 32};
+    double on[4] = {}, off[4] = {};
+    for (unsigned seed = 1; seed <= 8; ++seed) {
+        Picture picture;
+        picture.window = {0, 0, 192, 64};
+        picture.noise = 1;
+        picture.features = false;
+        picture.seed = seed;
+        picture.truth = [](int x, int y) { return 1 + 0.003 * x + 0.001 * y; };
+        write(picture.samples());
+        const Image image = krige().image;
+        for (int l = 0; l < 4; ++l)
+            for (int row = 0; row < 64; ++row)
+                for (int col = 16; col < 176; ++col) {
+                    const auto at = [&](int x) { return static_cast<double>(image.at(x, row)[0]); };
+                    const double d = at(col - 1) - 2 * at(col) + at(col + 1);
+                    const bool border = col % kLattices[l] == 0 || (col + 1) % kLattices[l] == 0;
+                    (border ? on : off)[l] += d * d * (border ? kLattices[l] / 2.0 - 1 : 1);
+                }
+    }
+    // Squares are heavy-tailed: their means over eight pictures are right to about 20 %.
+    for (int l = 0; l < 4; ++l) EXPECT_LT(on[l], 1.6 * off[l]) << kLattices[l];
+}
+
+TEST_F(DriftKriging, PartsOfTheLightAddUp) {
+    Picture picture;
+    SampleBand band = picture.samples();
+    std::mt19937 random(9);
+    std::uniform_real_distribution<float> share(0, 1);
+    band.channels.insert(band.channels.end(), {"key.R", "fill.R"});
+    band.values.resize(band.channels.size());
+    for (const float r : band.values[0]) {
+        const float s = share(random);
+        band.values[band.values.size() - 2].push_back(s * r);
+        band.values[band.values.size() - 1].push_back(r - s * r);
+    }
+    write(band);
+    for (const Fireflies fireflies : {Fireflies::Keep, Fireflies::Robust, Fireflies::Clamp}) {
+        const Image image =
+            krige({.fireflies = fireflies, .clamp = 1.5, .radiance = {"key.R", "fill.R"}}).image;
+        const int key = image.channel("key.R"), fill = image.channel("fill.R");
+        ASSERT_GE(std::min(key, fill), 0);
+        for (int row = 0; row < image.data.height; ++row)
+            for (int col = 0; col < image.data.width; ++col) {
+                const float* pixel = image.at(col, row);
+                ASSERT_NEAR(pixel[key] + pixel[fill], pixel[0], 4e-6) << col << " " << row;
+            }
+    }
+}
+
+TEST_F(DriftKriging, OneNonFiniteSampleCostsNoMoreThanItself) {
+    SampleBand band = Picture{}.samples();
+    const std::size_t bad = 30 * 8 * 70 + 35 * 8 + 3;
+    SampleBand without = band;
+    for (auto& channel : without.values) channel.erase(channel.begin() + static_cast<std::ptrdiff_t>(bad));
+    for (std::uint64_t& offset : without.offsets) offset -= offset > bad;
+    write(without);
+    const Reconstruction expected = krige();
+    for (const float value :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+        band.values[1][bad] = value;
+        write(band);
+        const Reconstruction found = krige();
+        EXPECT_EQ(found.image.pixels, expected.image.pixels);
+        EXPECT_EQ(found.report.droppedSamples, 1);
+    }
+}
+
+TEST_F(DriftKriging, PixelsWithoutSamplesArePredicted) {
+    Picture picture;
+    SampleBand band = picture.samples();
+    // Take all samples of a 3 x 3 block away.
+    SampleBand holed{band.x, band.y, band.width, band.height, {0}, band.channels, {}};
+    holed.values.resize(band.values.size());
+    for (int row = 0; row < band.height; ++row)
+        for (int col = 0; col < band.width; ++col) {
+            const std::size_t pixel = static_cast<std::size_t>(row * band.width + col);
+            if (std::abs(row - 20) > 1 || std::abs(col - 20) > 1)
+                for (std::size_t c = 0; c < band.values.size(); ++c)
+                    holed.values[c].insert(
+                        holed.values[c].end(),
+                        band.values[c].begin() + static_cast<std::ptrdiff_t>(band.offsets[pixel]),
+                        band.values[c].begin() + static_cast<std::ptrdiff_t>(band.offsets[pixel + 1]));
+            holed.offsets.push_back(holed.values[0].size());
+        }
+    write(holed);
+    const Reconstruction result = krige();
+    EXPECT_EQ(result.report.emptyPixels, 9);
+    const double truth = picture.truth(20 + band.x, 20 + band.y);
+    EXPECT_NEAR(result.image.at(20, 20)[0], truth, 0.25 * truth);
+}
+
+TEST_F(DriftKriging, FirefliesAsAskedFor) {
+    Picture picture;
+    SampleBand band = picture.samples();
+    const std::size_t hot = 30 * 8 * 70 + 35 * 8 + 3;
+    for (std::size_t c = 0; c < 3; ++c) band.values[c][hot] = 5000;
+    write(band);
+    const auto total = [](const Image& image) {
+        double sum = 0;
+        for (std::size_t i = 0; i < image.pixels.size(); i += static_cast<std::size_t>(image.channelCount()))
+            sum += static_cast<double>(image.pixels[i]);
+        return sum;
+    };
+    const double plain = total(mean());
+    const Reconstruction robust = krige(), kept = krige({.fireflies = Fireflies::Keep}),
+                         clamped = krige({.fireflies = Fireflies::Clamp, .clamp = 8});
+    EXPECT_LT(picture.error(robust.image), 0.01);
+    EXPECT_GT(robust.report.energyRemoved, 0.1);  // 5000 of about 34160 samples of 0.6
+    EXPECT_LT(robust.report.energyRemoved, 0.4);
+    EXPECT_EQ(kept.report.limitedSamples, 0);
+    EXPECT_EQ(kept.report.energyRemoved, 0);
+    EXPECT_EQ(clamped.report.limitedSamples, 1);
+    EXPECT_GT(plain - total(robust.image), 400);  // 5000 / 8 of light, gone
+}
+
+TEST_F(DriftKriging, ExactPixelsStayExact) {
+    Picture picture;
+    picture.truth = [](int x, int) { return x < 20 ? 2.0 : 0.5; };
+    picture.albedo = [](int x, int) { return x < 20 ? 1.0 : 0.5; };
+    SampleBand band = picture.samples();
+    for (std::size_t p = 0; p + 1 < band.offsets.size(); ++p)
+        if (static_cast<int>(p) % band.width + band.x < 20)
+            for (std::size_t s = band.offsets[p]; s < band.offsets[p + 1]; ++s)
+                for (std::size_t c = 0; c < 3; ++c) band.values[c][s] = 2;
+    write(band);
+    const Reconstruction result = krige();
+    EXPECT_EQ(result.report.exactPixels, 27 * 61);
+    for (int row = 0; row < 61; ++row)
+        for (int col = 0; col < 27; ++col) {
+            ASSERT_EQ(result.image.at(col, row)[0], 2);
+            ASSERT_EQ(result.image.at(col, row)[result.image.channel("stddev.R")], 0);
+        }
+}
+
+TEST_F(DriftKriging, StrengthMixesWithTheMean) {
+    const Picture picture;
+    write(picture.samples());
+    const Image plain = mean(), full = krige().image, none = krige({.strength = 0}).image,
+                half = krige({.strength = 0.5}).image;
+    for (int row = 0; row < 61; ++row)
+        for (int col = 0; col < 70; ++col)
+            for (int c = 0; c < 3; ++c) {
+                ASSERT_NEAR(half.at(col, row)[c], (full.at(col, row)[c] + none.at(col, row)[c]) / 2, 2e-6);
+                // All but the brightest samples of 5 x 5 pixels.
+                ASSERT_LE(none.at(col, row)[c], plain.at(col, row)[c] + 1e-5f);
+            }
+}
+
+TEST_F(DriftKriging, FewestAndOddestSamples) {
+    // One sample a pixel; one pixel; one column; black; huge; tiny: finite, and not negative.
+    for (const auto& [window, spp, scale] : {std::tuple{Window{0, 0, 40, 40}, 1, 1.0},
+                                             {Window{5, 5, 1, 1}, 1, 1.0},
+                                             {Window{0, 0, 1, 50}, 2, 1.0},
+                                             {Window{0, 0, 40, 3}, 4, 0.0},
+                                             {Window{0, 0, 33, 33}, 4, 1e12},
+                                             {Window{0, 0, 33, 33}, 4, 1e-12}}) {
+        Picture picture;
+        picture.window = window;
+        picture.spp = spp;
+        picture.truth = [scale = scale](int x, int) { return scale * (x > 15 ? 1 : 0.1); };
+        picture.noise = 0.3;
+        write(picture.samples());
+        for (const Quality quality : {Quality::Draft, Quality::Standard, Quality::High}) {
+            const Image image = krige({.quality = quality}).image;
+            for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << spp << " " << scale;
+            if (window.width > 1 && scale > 0) {
+                EXPECT_LT(picture.error(image), 0.09 / spp) << scale;
+            }
+        }
+    }
+}
+
+TEST_F(DriftKriging, BadOptionsAreTold) {
+    write(Picture{}.samples());
+    EXPECT_TRUE(DriftKrigingOptions{.strength = 2}.validate());
+    EXPECT_TRUE((DriftKrigingOptions{.fireflies = Fireflies::Clamp, .clamp = 0}).validate());
+    EXPECT_TRUE((DriftKrigingOptions{.band = {2, 2}}).validate());
+    EXPECT_FALSE(DriftKrigingOptions{}.validate());
+    EXPECT_THROW(krige({.strength = -1}), Error);
+    EXPECT_THROW(krige({.features = {"no.such"}}), Error);
+    EXPECT_THROW(krige({.radiance = {"R"}}), Error);
+    EXPECT_THROW(krige({.band = {0, 62}}), Error);  // of 61 rows: the first band has none
+}
+
+}  // namespace
+}  // namespace vlx
