@@ -32,9 +32,9 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
         case Quality::Standard:
             break;
         case Quality::High:
-            return {{8, 0.8f, 3, true}, {15, 3.f, 5, false}, {4, 1.f, 2, false}};
+            return {{8, 0.8f, 2, true}, {15, 3.f, 3, false}, {4, 1.f, 2, false}};
     }
-    return {{8, 0.8f, 6, true}, {15, 3.f, 10, false}, {4, 1.f, 4, false}};
+    return {{8, 0.8f, 4, true}, {15, 3.f, 5, false}, {4, 1.f, 3, false}};
 }
 
 /// First row of a band of an image of `height` rows.

@@ -46,8 +46,8 @@ namespace vlx {
 /// What is given up for speed: models used, and how densely neighbourhoods overlap.
 enum class Quality {
     Draft,     ///< the medium model, a neighbourhood every 6 pixels
-    Standard,  ///< three models, every 4 to 10 pixels
-    High,      ///< three models, every 2 to 5 pixels
+    Standard,  ///< three models, every 3 to 5 pixels
+    High,      ///< three models, every 2 to 3 pixels
 };
 
 /// What happens to samples that are brighter than all else around (fireflies).
