@@ -80,7 +80,7 @@ struct StackCommand {
             options.map[mapping.substr(0, sign)] = mapping.substr(sign + 1);
         }
         vlx::checkOutputName(dump, images);
-        vlx::StackReport report;
+        vlx::ImportReport report;
         {
             vlx::ProgressBar bar("stacking");
             report = vlx::stackImages(images, dump, options, bar);
