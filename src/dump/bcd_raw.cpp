@@ -33,18 +33,19 @@ RawHeader readHeader(const RawFile& file) {
     const auto inside = [](std::int32_t value, std::int32_t most) { return value >= 1 && value <= most; };
     if (!inside(header.width, kMaxSide) || !inside(header.height, kMaxSide) ||
         !inside(header.samples, 1 << 24) || (header.channels != 3 && header.channels != 4))
-        throw Error(file.name(), "expected BCD's raw samples: width, height, samples and 3 or 4 channels; found " +
-                                     std::to_string(header.width) + " x " + std::to_string(header.height) +
-                                     " pixels of " + std::to_string(header.samples) + " samples of " +
-                                     std::to_string(header.channels) + " channels");
+        throw Error(file.name(),
+                    "expected BCD's raw samples: width, height, samples and 3 or 4 channels; found " +
+                        std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels of " +
+                        std::to_string(header.samples) + " samples of " + std::to_string(header.channels) +
+                        " channels");
     // At most 2^20 * 2^24 * 4 * 4 = 2^48 bytes a row, and that times 2^20 rows does not fit: row by row.
-    const std::uint64_t row = std::uint64_t(header.width) * std::uint64_t(header.samples) *
-                              std::uint64_t(header.channels) * 4;
+    const std::uint64_t row =
+        std::uint64_t(header.width) * std::uint64_t(header.samples) * std::uint64_t(header.channels) * 4;
     const std::uint64_t rows = (size - kHeaderBytes) / row;
     if (rows != std::uint64_t(header.height) || (size - kHeaderBytes) % row != 0)
-        throw Error(file.name(), "expected " + std::to_string(header.height) + " rows of " + std::to_string(row) +
-                                     " bytes as its header says, found " + std::to_string(size - kHeaderBytes) +
-                                     " bytes");
+        throw Error(file.name(), "expected " + std::to_string(header.height) + " rows of " +
+                                     std::to_string(row) + " bytes as its header says, found " +
+                                     std::to_string(size - kHeaderBytes) + " bytes");
     return header;
 }
 

@@ -31,8 +31,7 @@ ImportReport importBcdStatistics(const std::string& image, const std::string& co
     source.meaning = VarianceMeaning::OfSample;
     source.samples = options.samples;
     const auto colours = findTriple(images.channels(0), {""});
-    if (!colours)
-        throw Error(image, "expected an image of R, G and B, found " + listed(images.channels(0)));
+    if (!colours) throw Error(image, "expected an image of R, G and B, found " + listed(images.channels(0)));
     for (std::size_t c = 0; c < 3; ++c) {
         const std::string colour(1, "RGB"[c]);
         source.mean[c] = images.take(0, (*colours)[c]);
@@ -41,15 +40,17 @@ ImportReport importBcdStatistics(const std::string& image, const std::string& co
         report.mapped["variance." + colour] = covariance + " " + binName(c);
     }
     for (const auto& name : images.channels(0))
-        if (std::find(colours->begin(), colours->end(), name) == colours->end()) report.ignored.push_back(name);
+        if (std::find(colours->begin(), colours->end(), name) == colours->end())
+            report.ignored.push_back(name);
     report.ignored.push_back("covariances between colours");
     if (!histogram.empty()) {
         std::size_t bins = 0;
         while (contains(images.channels(2), binName(bins))) ++bins;
         if (bins < 4)
-            throw Error(histogram, "expected a histogram of three colours and the number of samples: channels "
-                                   "Bin_0000, Bin_0001 and on; found " +
-                                       listed(images.channels(2)));
+            throw Error(histogram,
+                        "expected a histogram of three colours and the number of samples: channels "
+                        "Bin_0000, Bin_0001 and on; found " +
+                            listed(images.channels(2)));
         source.count = images.take(2, binName(bins - 1));
         report.ignored.push_back("the histogram of " + std::to_string((bins - 1) / 3) + " bins");
         report.notes.push_back("The number of samples of each pixel comes from " + binName(bins - 1) +

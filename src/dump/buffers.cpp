@@ -116,7 +116,8 @@ ImportReport importBuffers(const std::string& a, const std::string& b, const std
 
     report.notes.push_back("Each buffer is one sample a pixel and one replicate.");
     if (known) {
-        report.notes.push_back("The variance is taken as that of the mean of both: each buffer has twice it.");
+        report.notes.push_back(
+            "The variance is taken as that of the mean of both: each buffer has twice it.");
         report.notes.push_back(agreement.text());
     }
     if (images.hash(0) == images.hash(1))
@@ -124,8 +125,9 @@ ImportReport importBuffers(const std::string& a, const std::string& b, const std
                                ": they are not two halves. Errors will be underestimated.");
     report.missing = missingChannels(header);
     if (!known)
-        report.missing.push_back({"variances", "two values a pixel say little about its noise: it is mostly "
-                                               "estimated from neighbouring pixels"});
+        report.missing.push_back({"variances",
+                                  "two values a pixel say little about its noise: it is mostly "
+                                  "estimated from neighbouring pixels"});
     return report;
 }
 

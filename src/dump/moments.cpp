@@ -135,8 +135,7 @@ ImportReport importMoments(const std::string& image, const std::string& dump, co
         if (channel == "sample.replicate") throw Error(image, "sample.replicate cannot be mapped");
         origins[channel] = {0, name};
     }
-    for (const char* channel : {"R", "G", "B"})
-        require(images, origins, channel, "say it with a mapping");
+    for (const char* channel : {"R", "G", "B"}) require(images, origins, channel, "say it with a mapping");
     for (const char* channel : {"variance.R", "variance.G", "variance.B"})
         require(images, origins, channel, "a mapping or another image can hold the variance");
 
