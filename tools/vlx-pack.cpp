@@ -6,7 +6,9 @@
 #include "pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
+#include "variolux/dump/import.h"
 #include "variolux/dump/info.h"
+#include "variolux/dump/merge.h"
 #include "variolux/dump/points.h"
 #include "variolux/dump/subset.h"
 
@@ -102,6 +104,35 @@ struct SubsetCommand {
     }
 };
 
+struct MergeCommand {
+    std::vector<std::string> parts;
+    std::string output;
+    vlx::MergeOptions options;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Join the parts of one picture, bands of rows or tiles, into one dump, or into one image when "
+            "the "
+            "parts\nare flat images. Values, types and attributes stay as they are.");
+        app.footer(
+            "Example:\n"
+            "  vlx-pack merge band_*.exr -o room.exr");
+        app.add_option("PART", parts,
+                       "All parts, in any order; #### in a name: all files with a number there")
+            ->required();
+        app.add_option("-o,--output", output, "The dump or image to write (.exr)")->required();
+        app.add_flag("--crop", options.crop, "The parts need only fill a rectangle of the picture");
+    }
+
+    int run() {
+        parts = vlx::expandSequences(parts);
+        vlx::checkOutputName(output, parts);
+        vlx::ProgressBar bar("merging");
+        vlx::mergeParts(parts, output, options, bar);
+        return vlx::kDone;
+    }
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -112,6 +143,7 @@ int main(int argc, char** argv) {
     InfoCommand info;
     SampleCommand sample;
     SubsetCommand subset;
+    MergeCommand merge;
     commands.push_back({app.add_subcommand("info"), [&] { return info.run(); }});
     info.bind(*commands.back().app);
     vlx::addImportCommands(app, commands);
@@ -119,6 +151,8 @@ int main(int argc, char** argv) {
     sample.bind(*commands.back().app);
     commands.push_back({app.add_subcommand("subset"), [&] { return subset.run(); }});
     subset.bind(*commands.back().app);
+    commands.push_back({app.add_subcommand("merge"), [&] { return merge.run(); }});
+    merge.bind(*commands.back().app);
     return vlx::runTool(argc, argv, app, [&] {
         const auto asked =
             std::find_if(commands.begin(), commands.end(),
