@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "exr_header.h"
+#include "flat_header.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
 
@@ -33,6 +34,7 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status))
         throw Error(path, "expected an image, found no such file");
+    checkFlatHeader(path);
     auto input = OIIO::ImageInput::open(path);
     if (!input) throw Error(path, "expected an image: " + reason({}));
     const OIIO::ImageSpec& spec = input->spec();

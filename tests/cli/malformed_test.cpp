@@ -1,0 +1,76 @@
+// Every tool on files that are wrong: no crash, no hang, no more memory than they are worth, exit code 1, and
+// a message that names the file.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+
+#include "malformed_files.h"
+#include "run_tool.h"
+#include "temporary_folder.h"
+
+namespace vlx {
+namespace {
+
+struct Command {
+    std::string tool;
+    std::vector<std::string> before, after;  // the file's name goes between them
+};
+
+std::vector<Command> commandsFor(MalformedKind kind, const std::string& out) {
+    switch (kind) {
+        case MalformedKind::Dump:
+            return {{"vlx-pack", {"info"}, {}},
+                    {"vlx-pack", {"subset"}, {"-o", out, "--samples", "1"}},
+                    {"vlx-krige", {}, {"-o", out}}};
+        case MalformedKind::Image:
+            return {{"vlx-pack", {"stack"}, {"-o", out}},
+                    {"vlx-pack", {"moments"}, {"-o", out, "--preset", "plain", "--variance-is", "mean"}},
+                    {"vlx-pack", {"merge"}, {"-o", out, "--crop"}}};
+        case MalformedKind::BcdRaw:
+            return {{"vlx-pack", {"bcd"}, {"-o", out}}};
+        case MalformedKind::Sbmc:
+            return {{"vlx-pack", {"sbmc"}, {"-o", out}}};
+        default:
+            return {{"vlx-trace", {}, {"-o", out, "--width", "8", "--spp", "1"}}};
+    }
+}
+
+TEST(Malformed, TwoHundredFilesByHand) {
+    const auto files = malformedFiles();
+    EXPECT_GE(files.size(), 200u);
+    std::set<std::string> names;
+    RunOptions limits;
+    limits.cpuSeconds = 20;
+#ifndef VARIOLUX_SANITIZED
+    limits.memoryBytes = std::uint64_t{2} << 30;
+#endif
+    const TemporaryFolder folder;
+    for (const MalformedFile& file : files) {
+        EXPECT_TRUE(names.insert(file.name).second) << file.name;
+        const std::string path = folder / (file.kind == MalformedKind::Gltf ? "bad.gltf" : "bad.exr");
+        std::ofstream(path, std::ios::binary)
+            .write(reinterpret_cast<const char*>(file.bytes.data()),
+                   static_cast<std::streamsize>(file.bytes.size()));
+        for (const Command& command : commandsFor(file.kind, folder / "out.exr")) {
+            if (file.name == "image that is a dump" && command.before.front() == "merge") continue;  // fine
+            std::vector<std::string> arguments = command.before;
+            arguments.push_back(path);
+            arguments.insert(arguments.end(), command.after.begin(), command.after.end());
+            const ToolRun run = runTool(command.tool, arguments, limits);
+            const std::string what = command.tool + " " +
+                                     (command.before.empty() ? "" : command.before.front()) + " on a " +
+                                     file.name;
+            EXPECT_EQ(run.exitCode, 1) << what << "\n" << run.err;
+            EXPECT_NE(run.err.find(path + ": "), std::string::npos) << what << "\n" << run.err;
+            EXPECT_EQ(run.err.find("internal error"), std::string::npos) << what << "\n" << run.err;
+            EXPECT_EQ(folder.entries(), 1) << what << " left something";
+        }
+        std::filesystem::remove(path);
+        std::filesystem::remove(folder / "out.exr");
+    }
+}
+
+}  // namespace
+}  // namespace vlx
