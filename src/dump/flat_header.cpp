@@ -103,6 +103,8 @@ void checkFlatHeader(const std::string& path) {
     Bytes start(std::min<std::uint64_t>(size, 1 << 16));
     file.readAt(0, start);
     if (start.size() < 8 || loadWord(start.data()) != 20000630) return;
+    if ((loadWord(start.data() + 4) & 0x800) != 0)
+        throw Error(path, "expected a flat image, found deep samples: this is a dump already");
     const bool multiPart = (loadWord(start.data() + 4) & 0x1000) != 0;
     for (;;) {
         HeaderWalker walker(path, start, size);

@@ -121,7 +121,7 @@ void addDumps(Collection& all, const TemporaryFolder& folder) {
                  [&](Bytes& b) { put(b, static_cast<std::size_t>(chunk) + field, value); });
     with("whose counts decrease", [&](Bytes& b) { put(b, static_cast<std::size_t>(chunk) + 28, 100); });
     with("with a flat part only", [&](Bytes& b) {
-        writeImage(folder / "flat.exr", Image({0, 0, 4, 4}, {"R", "G", "B"}));
+        writeImage(folder / "flat.exr", vlx::Image({0, 0, 4, 4}, {"R", "G", "B"}));
         b = fileBytes(folder / "flat.exr");
     });
     all.add(Dump, "dump that is text", {'s', 'o', 'm', 'e', ' ', 't', 'e', 'x', 't', '\n'});
@@ -130,7 +130,7 @@ void addDumps(Collection& all, const TemporaryFolder& folder) {
 
 void addImages(Collection& all, const TemporaryFolder& folder) {
     using enum MalformedKind;
-    Image image({0, 0, 9, 20}, {"R", "G", "B", "variance.R", "variance.G", "variance.B"});
+    vlx::Image image({0, 0, 9, 20}, {"R", "G", "B", "variance.R", "variance.G", "variance.B"});
     for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i % 7);
     writeImage(folder / "image.exr", image);
     const Bytes good = fileBytes(folder / "image.exr");
