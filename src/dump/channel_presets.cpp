@@ -153,7 +153,7 @@ std::vector<DumpChannel> dumpChannels(const ChannelMap& map, bool replicates) {
         if (standard.name == kReplicate ? replicates : map.contains(standard.name))
             channels.push_back(standard);
     for (const auto& [name, source] : map) {
-        const auto known = [&](const DumpChannel& channel) { return channel.name == name; };
+        const auto known = [&name = name](const DumpChannel& channel) { return channel.name == name; };
         if (std::none_of(channels.begin(), channels.end(), known))
             channels.push_back({name, ChannelType::Float});
     }

@@ -85,13 +85,15 @@ TEST_P(Malformed, FilesEndInAMessage) {
     }
 }
 
+std::string kindName(const testing::TestParamInfo<MalformedKind>& kind) {
+    constexpr const char* names[] = {"Dump", "Image", "BcdRaw", "Sbmc", "Gltf"};
+    return names[static_cast<int>(kind.param)];
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, Malformed,
                          testing::Values(MalformedKind::Dump, MalformedKind::Image, MalformedKind::BcdRaw,
                                          MalformedKind::Sbmc, MalformedKind::Gltf),
-                         [](const auto& info) {
-                             constexpr const char* names[] = {"Dump", "Image", "BcdRaw", "Sbmc", "Gltf"};
-                             return std::string(names[static_cast<int>(info.param)]);
-                         });
+                         kindName);
 
 }  // namespace
 }  // namespace vlx
