@@ -146,10 +146,8 @@ struct BuffersCommand : ImportCommand {
 void bindHalves(CLI::App& app, double& samples, bool& single, std::uint64_t& seed) {
     app.add_option("--samples", samples, "Samples a pixel, where the variance is of single ones")
         ->check(CLI::Range(1.0, 1e9));
-    app.add_flag(
-        "--single", single,
-        "One sample a pixel; else two artificial halves of independent noise, for programs that need "
-        "them");
+    app.add_flag("--single", single,
+                 "One sample a pixel; else two artificial halves whose noise has nothing in common");
     app.add_option("--seed", seed, "Of the halves")->capture_default_str();
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "channel_presets.h"
 #include "variolux/base/hash.h"
@@ -21,13 +20,8 @@ constexpr double kRgbOfXyz[3][3] = {{3.2404542, -1.5371385, -0.4985314},
                                     {-0.9692660, 1.8760108, 0.0415560},
                                     {0.0556434, -0.2040259, 1.0572252}};
 
-// A standard normal number of each (seed, pixel): Box and Muller's transform of two hashes.
-double normalOf(std::uint64_t seed, int x, int y) {
-    const auto unit = [&](int which) {
-        return (static_cast<double>(hashOf(seed, x, y, which) >> 11) + 0.5) * 0x1p-53;
-    };
-    return std::sqrt(-2 * std::log(unit(0))) * std::cos(2 * std::numbers::pi * unit(1));
-}
+// +1 or -1, as a coin falls for each (seed, pixel).
+double signOf(std::uint64_t seed, int x, int y) { return (hashOf(seed, x, y) >> 63) == 0 ? 1 : -1; }
 
 // Reads what the pixels of the images hold.
 class Pixels {
@@ -119,12 +113,12 @@ void writeMoments(const MomentSource& source, const MomentOutput& output, Import
             const Triple v = pixels.variance(p);
             const bool halves = output.halves && v[0] >= 0;
             const auto width = static_cast<std::size_t>(band.width);
-            const double z = halves ? normalOf(output.seed, band.x + static_cast<int>(p % width),
-                                               band.y + static_cast<int>(p / width))
-                                    : 0;
+            const double sign = halves ? signOf(output.seed, band.x + static_cast<int>(p % width),
+                                                band.y + static_cast<int>(p / width))
+                                       : 0;
             for (int half = 0; half < (halves ? 2 : 1); ++half) {
                 for (std::size_t c = 0; c < 3; ++c) {
-                    const double off = halves ? (half == 0 ? z : -z) * std::sqrt(v[c]) : 0;
+                    const double off = halves ? (half == 0 ? sign : -sign) * std::sqrt(v[c]) : 0;
                     band.values[colour[c]].push_back(static_cast<float>(mean[c] + off));
                     band.values[variance[c]].push_back(static_cast<float>(halves ? 2 * v[c] : v[c]));
                 }

@@ -192,7 +192,7 @@ TEST(ImportMoments, MitsubasSecondMomentsGiveBesselsVariance) {
 }
 
 // The halves' errors: each of variance 2 v, uncorrelated, when the image's own error has variance v.
-TEST(ImportMoments, HalvesHaveIndependentNoise) {
+TEST(ImportMoments, HalvesHaveUncorrelatedNoise) {
     const TemporaryFolder folder;
     const Window window{0, 0, 160, 120};
     std::mt19937 random(11);
@@ -215,6 +215,8 @@ TEST(ImportMoments, HalvesHaveIndependentNoise) {
         const double a = band.values[0][2 * p] - kTruth, b = band.values[0][2 * p + 1] - kTruth;
         ASSERT_EQ(band.values[1][2 * p], 0);
         ASSERT_EQ(band.values[1][2 * p + 1], 1);
+        ASSERT_NEAR(a - b, std::copysign(2 * std::sqrt(kVariance), a - b), 1e-5)
+            << "the two tell the variance";
         sums[0] += a;
         sums[1] += b;
         sums[2] += a * a;

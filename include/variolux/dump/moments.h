@@ -52,12 +52,15 @@ struct MomentOptions {
 /// Makes a dump of a flat image that has a variance for each pixel.
 ///
 /// The dump has channels variance.R, variance.G, variance.B: the known error variance of each sample. With
-/// `halves` a pixel of mean m and variance of the mean v becomes the two samples m + s z and m - s z, where
-/// s^2 = v and z is standard normal, drawn from (seed, pixel) and shared by R, G and B. Each has the error
-/// variance 2 v; their mean is m. Their errors are uncorrelated: cov = var(m) - v var(z) = 0, and independent
-/// where the error of m is normal (data fission: Rasines and Young 2022; Leiner et al. 2023), so that they
-/// serve to choose between models as samples of the renderer would. m +- s itself would not: its two errors
-/// are opposite. Without `halves` a pixel is the one sample m with variance v.
+/// `halves` a pixel of mean m and variance of the mean v becomes the two samples m + s and m - s, s^2 = v,
+/// where the sign of s is a coin's, thrown for (seed, pixel) and shared by R, G and B. Each has the error
+/// variance 2 v; their mean is m, and the variance of their mean, estimated from the two, is v. If e is the
+/// error of m, the errors of the halves are e + s and e - s: unbiased, as the sign is random, and
+/// uncorrelated, E[(e + s) (e - s)] = var(e) - v = 0, with those of other pixels too. So they can serve to
+/// choose between linear estimates as two halves of the renderer's samples would (with a fixed sign one half
+/// would be too bright, the other too dark). Uncorrelated is not independent: where a choice is not linear in
+/// the data they are an approximation. A lone firefly, whose s is about m, lands in one of the halves, as it
+/// would have. Without `halves` a pixel is the one sample m with variance v.
 ///
 /// A variance that is not finite, or of fewer samples than it takes, is not known: then the pixel is one
 /// sample m with variance -1. A negative one (rounding of second moments) counts as 0. Variances of X, Y, Z
