@@ -1,5 +1,5 @@
 // Writes the seeds of the fuzz targets: fuzz_corpus DIR makes DIR/dump, DIR/bcd, DIR/sbmc, DIR/images and
-// DIR/gltf.
+// DIR/gltf anew: what a fuzzer has added there is gone.
 
 #include <cstdio>
 #include <filesystem>
@@ -71,6 +71,7 @@ int main(int argc, char** argv) {
         return 2;
     }
     const fs::path folder = argv[1];
+    for (const char* target : {"dump", "bcd", "sbmc", "images", "gltf"}) fs::remove_all(folder / target);
     dumps(folder / "dump");
     write(folder / "bcd/three", bcdRawBytes({}));
     BcdRaw four;
