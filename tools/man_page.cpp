@@ -101,7 +101,9 @@ std::string firstSentence(const std::string& text) {
 
 std::string manPage(const CLI::App& app, const std::string& version) {
     const std::string name = app.get_name();
-    std::string text = ".TH " + upper(escaped(name)) + " 1 \"\" \"Variolux " + version + "\"\n";
+    std::string title = upper(name);
+    std::replace(title.begin(), title.end(), ' ', '-');
+    std::string text = ".TH " + escaped(title) + " 1 \"\" \"Variolux " + version + "\"\n";
     text += ".SH NAME\n" + escaped(name) + " \\- " + escaped(firstSentence(app.get_description())) + "\n";
     text += ".SH SYNOPSIS\n";
     const auto commands = commandsOf(app);
