@@ -50,7 +50,8 @@ class ProgressBar {
 };
 
 /// What programs read: one record of `fraction` in [0, 1] done after `seconds`, ended by a line break.
-///     {"event":"progress","task":"kriging","fraction":0.25,"seconds":10.0,"secondsLeft":30.0,"peakMemoryMB":210}
+///     {"event":"progress","task":"kriging","fraction":0.25,"seconds":10.0,"secondsLeft":30.0,
+///      "peakMemoryMB":210.0}                                                      (on one line)
 /// secondsLeft is null as long as it cannot be told. Or the lines "openjd_status: kriging" and
 /// "openjd_progress: 25.0".
 std::string progressRecord(LogFormat format, const std::string& label, double fraction, double seconds,

@@ -41,6 +41,7 @@ std::vector<Command> commandsFor(MalformedKind kind, const std::string& out) {
 TEST(MalformedFiles, ThereAreTwoHundredFiles) {
     const auto files = malformedFiles();
     EXPECT_GE(files.size(), 200u);
+    RecordProperty("files", static_cast<int>(files.size()));
     std::set<std::string> names;
     for (const MalformedFile& file : files) EXPECT_TRUE(names.insert(file.name).second) << file.name;
 }
