@@ -1,10 +1,13 @@
 #include "progress_bar.h"
 
 #include <sys/ioctl.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace vlx {
 
@@ -16,6 +19,8 @@ int terminalColumns(std::FILE* stream) {
     return size.ws_col;
 }
 
+std::atomic<LogFormat> currentFormat{LogFormat::Text};
+
 std::string twoDigits(std::int64_t value) { return (value < 10 ? "0" : "") + std::to_string(value); }
 
 }  // namespace
@@ -23,14 +28,17 @@ std::string twoDigits(std::int64_t value) { return (value < 10 ? "0" : "") + std
 ProgressBar::ProgressBar(std::string label, std::FILE* stream)
     : label_(std::move(label)), stream_(stream), terminal_(::isatty(::fileno(stream)) == 1) {}
 
+void setLogFormat(LogFormat format) { currentFormat = format; }
+LogFormat logFormat() { return currentFormat; }
+
 ProgressBar::~ProgressBar() {
-    if (!visible_) return;
+    if (!visible_ || logFormat() != LogFormat::Text) return;
     std::fputs("\r\033[K", stream_);
     std::fflush(stream_);
 }
 
 ProgressBar::operator Progress() {
-    if (!terminal_) return {};
+    if (!terminal_ && logFormat() == LogFormat::Text) return {};
     return [this](std::int64_t done, std::int64_t total) { update(done, total); };
 }
 
@@ -39,10 +47,21 @@ void ProgressBar::update(std::int64_t done, std::int64_t total) {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock || total <= 0) return;
     const auto now = Clock::now();
-    if (visible_ && now - drawn_ < std::chrono::milliseconds(100)) return;
+    const LogFormat format = logFormat();
+    const auto pause = std::chrono::milliseconds(format == LogFormat::Text ? 100 : 1000);
+    const bool last = format != LogFormat::Text && done >= total && fraction_ < 1;
+    if (visible_ && now - drawn_ < pause && !last) return;
     // Reports of several threads may overtake each other: the bar never goes back.
     fraction_ = std::max(fraction_, static_cast<double>(done) / static_cast<double>(total));
     const double seconds = std::chrono::duration<double>(now - start_).count();
+    if (format != LogFormat::Text) {
+        std::FILE* const stream = format == LogFormat::Json ? stream_ : stdout;
+        std::fputs(progressRecord(format, label_, fraction_, seconds, peakMegabytes()).c_str(), stream);
+        std::fflush(stream);
+        drawn_ = now;
+        visible_ = true;
+        return;
+    }
     const std::string line = progressLine(label_, fraction_, seconds, terminalColumns(stream_) - 1);
     std::fprintf(stream_, "\r%s\033[K", line.c_str());
     std::fflush(stream_);
@@ -66,6 +85,34 @@ std::string progressLine(const std::string& label, double fraction, double secon
     }
     line += tail;
     return line.substr(0, static_cast<std::size_t>(std::max(columns, 0)));
+}
+
+std::string progressRecord(LogFormat format, const std::string& label, double fraction, double seconds,
+                           double peakMegabytes) {
+    fraction = std::clamp(fraction, 0.0, 1.0);
+    if (format == LogFormat::OpenJd) {
+        char percent[32];
+        std::snprintf(percent, sizeof percent, "%.1f", fraction * 100);
+        return "openjd_status: " + label + "\nopenjd_progress: " + percent + "\n";
+    }
+    const auto rounded = [](double value, double unit) { return std::round(value / unit) * unit; };
+    nlohmann::ordered_json record = {{"event", "progress"},
+                                     {"task", label},
+                                     {"fraction", rounded(fraction, 1e-4)},
+                                     {"seconds", rounded(seconds, 1e-2)},
+                                     {"secondsLeft", nullptr},
+                                     {"peakMemoryMB", std::round(peakMegabytes)}};
+    if (fraction >= 1)
+        record["secondsLeft"] = 0.0;
+    else if (fraction > 0 && seconds >= 1)
+        record["secondsLeft"] = rounded(seconds * (1 - fraction) / fraction, 0.1);
+    return record.dump() + "\n";
+}
+
+double peakMegabytes() {
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    return static_cast<double>(usage.ru_maxrss) * 1024 * 1e-6;
 }
 
 std::string durationText(double seconds) {

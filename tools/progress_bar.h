@@ -10,9 +10,21 @@
 
 namespace vlx {
 
+/// Who reads what a tool says about its progress.
+enum class LogFormat {
+    Text,    ///< people: a bar, on a terminal only
+    Json,    ///< programs: a line of JSON on stderr at the start, once a second, and in the end
+    OpenJd,  ///< Open Job Description: openjd_progress and openjd_status lines on stdout, as often
+};
+
+/// For all progress from now on. Called once, before any.
+void setLogFormat(LogFormat format);
+LogFormat logFormat();
+
 /// One line that says how far a task is: label, bar, percent, time left. Redrawn in place at most ten times a
 /// second, and only when `stream` is a terminal: nothing is written into a log file or a pipe. Erased when
-/// the object goes. Safe to be told from several threads; must outlive the Progress made from it.
+/// the object goes. With another LogFormat it writes that instead, terminal or not. Safe to be told from
+/// several threads; must outlive the Progress made from it.
 class ProgressBar {
   public:
     explicit ProgressBar(std::string label, std::FILE* stream = stderr);
@@ -36,6 +48,17 @@ class ProgressBar {
     double fraction_ = 0;
     bool visible_ = false;
 };
+
+/// What programs read: one record of `fraction` in [0, 1] done after `seconds`, ended by a line break.
+///     {"event":"progress","task":"kriging","fraction":0.25,"seconds":10.0,"secondsLeft":30.0,
+///      "peakMemoryMB":210.0}                                                      (on one line)
+/// secondsLeft is null as long as it cannot be told. Or the lines "openjd_status: kriging" and
+/// "openjd_progress: 25.0".
+std::string progressRecord(LogFormat format, const std::string& label, double fraction, double seconds,
+                           double peakMegabytes);
+
+/// The most memory that this process has had, in 10^6 bytes.
+double peakMegabytes();
 
 /// The text of the line, at most `columns` characters: `fraction` in [0, 1] is done after `seconds`.
 std::string progressLine(const std::string& label, double fraction, double seconds, int columns);

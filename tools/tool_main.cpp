@@ -1,24 +1,73 @@
 #include "tool_main.h"
 
+#include <unistd.h>
+
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <new>
+#include <nlohmann/json.hpp>
 
 #include "help_formatter.h"
+#include "man_page.h"
+#include "progress_bar.h"
 #include "variolux/base/error.h"
+#include "variolux/base/output_file.h"
 
 namespace vlx {
 
 namespace {
 
+constexpr char kExitCodes[] =
+    "Exit codes: 0 done; 1 failure at run time (a file, the disk, memory); 2 bad usage; 3 a comparison "
+    "passed "
+    "its threshold. Ended by a signal, it leaves no unfinished files.";
+
+// Leaves no unfinished files, then ends as the signal would have ended it.
+extern "C" void endBySignal(int number) {
+    removeUnfinishedFiles();
+    std::signal(number, SIG_DFL);
+    std::raise(number);
+}
+
+void catchSignals() {
+    for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+        struct sigaction before {};
+        ::sigaction(number, nullptr, &before);
+        if (before.sa_handler == SIG_IGN) continue;  // nohup, background jobs
+        struct sigaction action {};
+        action.sa_handler = endBySignal;
+        ::sigemptyset(&action.sa_mask);
+        ::sigaction(number, &action, nullptr);
+    }
+}
+
+// The end of a run, for programs.
+void logEnd(int code, const std::string& message) {
+    if (logFormat() == LogFormat::OpenJd && code != kDone && !message.empty()) {
+        std::string line = message;
+        for (char& c : line)
+            if (c == '\n') c = ' ';
+        std::printf("openjd_fail: %s\n", line.c_str());
+        std::fflush(stdout);
+    }
+    if (logFormat() != LogFormat::Json) return;
+    nlohmann::ordered_json record = {
+        {"event", "end"}, {"exitCode", code}, {"peakMemoryMB", std::round(peakMegabytes())}};
+    if (!message.empty()) record["message"] = message;
+    std::fputs((record.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n").c_str(),
+               stderr);
+}
+
 int fail(const CLI::App& app, std::string message) {
     // Messages quote names out of files, which may hold what a terminal would obey.
     for (char& c : message)
         if ((static_cast<unsigned char>(c) < 32 && c != '\n') || c == 127) c = '?';
-    std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), message.c_str());
+    if (logFormat() != LogFormat::Json)
+        std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), message.c_str());
+    logEnd(kFailed, message);
     return kFailed;
 }
 
@@ -26,6 +75,28 @@ int badUsage(const CLI::App& app, const std::string& message) {
     std::fprintf(stderr, "%s: %s\nRun %s --help for the options.\n", app.get_name().c_str(), message.c_str(),
                  app.get_name().c_str());
     return kBadUsage;
+}
+
+std::vector<CLI::App*> allOf(CLI::App& app) {
+    std::vector<CLI::App*> all = {&app};
+    for (CLI::App* const command : app.get_subcommands([](CLI::App*) { return true; }))
+        for (CLI::App* const inner : allOf(*command)) all.push_back(inner);
+    return all;
+}
+
+// Options that every tool and command has.
+void addCommonOptions(CLI::App& app, LogFormat& format) {
+    for (CLI::App* const command : allOf(app)) {
+        addChoice(
+            *command, "--log", format,
+            {{"text", LogFormat::Text}, {"json", LogFormat::Json}, {"openjd", LogFormat::OpenJd}},
+            "Progress for people, as lines of JSON on standard error, or as Open Job Description's lines on "
+            "standard output");
+        command->add_flag_callback("--help-man", [&app] { throw ManPage(manPage(app, VARIOLUX_VERSION)); })
+            ->group("");
+    }
+    const std::string footer = app.get_footer();
+    app.footer(footer + (footer.empty() ? "" : "\n\n") + wrapped(kExitCodes, 80));
 }
 
 void setFormatter(CLI::App& app, const std::shared_ptr<CLI::FormatterBase>& formatter) {
@@ -39,15 +110,23 @@ void setFormatter(CLI::App& app, const std::shared_ptr<CLI::FormatterBase>& form
 int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run) {
     // A file size limit must end in an error message and a clean folder, like a full disk, not in a signal.
     std::signal(SIGXFSZ, SIG_IGN);
+    catchSignals();
+    LogFormat format = LogFormat::Text;
+    addCommonOptions(app, format);
     app.set_version_flag("--version", "Variolux " VARIOLUX_VERSION, "Print the version and exit");
     setFormatter(app, std::make_shared<HelpFormatter>());
     try {
         app.parse(argc, argv);
+        setLogFormat(format);
         const int code = run();
         // Results on stdout that did not get there are a failure too.
         std::cout.flush();
         if (!std::cout || std::fflush(stdout) != 0) return fail(app, "standard output cannot be written");
+        logEnd(code, {});
         return code;
+    } catch (const ManPage& page) {
+        std::fputs(page.text.c_str(), stdout);
+        return std::fflush(stdout) == 0 ? kDone : kFailed;
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
         return badUsage(app, error.what());

@@ -8,7 +8,8 @@
 
 namespace vlx {
 
-/// Exit codes of every tool.
+/// Exit codes of every tool. A tool ended by SIGINT, SIGTERM or SIGHUP removes its unfinished files and ends
+/// by that signal: shells show 128 + its number (130, 143, 129).
 enum ExitCode : int {
     kDone = 0,
     kFailed = 1,    ///< run-time failure: a file, the disk, memory
@@ -16,9 +17,10 @@ enum ExitCode : int {
     kPassed = 3,    ///< a comparison passed its threshold
 };
 
-/// The main function of a tool: adds --version to `app`, parses the command line, calls `run`, and turns what
-/// goes wrong into a message on stderr and an exit code. `run` returns an ExitCode; it may throw vlx::Error
-/// (exit 1) or CLI::ValidationError (options that do not fit together: exit 2).
+/// The main function of a tool: adds --version, --log and --help-man (and the exit codes to the help's end)
+/// to `app`, catches signals, parses the command line, calls `run`, and turns what goes wrong into a message
+/// on stderr and an exit code. `run` returns an ExitCode; it may throw vlx::Error (exit 1) or
+/// CLI::ValidationError (options that do not fit together: exit 2).
 ///
 ///     int main(int argc, char** argv) {
 ///         CLI::App app("What the tool does", "vlx-something");

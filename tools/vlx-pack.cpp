@@ -1,13 +1,15 @@
 // vlx-pack: tells what a sample dump holds, and makes dumps of other renderers' images.
 
-#include <cstdio>
+#include <algorithm>
 #include <iostream>
 
+#include "pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
+#include "variolux/dump/import.h"
 #include "variolux/dump/info.h"
+#include "variolux/dump/merge.h"
 #include "variolux/dump/points.h"
-#include "variolux/dump/stack.h"
 #include "variolux/dump/subset.h"
 
 namespace {
@@ -32,64 +34,6 @@ struct InfoCommand {
             info = vlx::inspectDump(file, bar);
         }
         std::cout << (json ? vlx::toJson(info) : vlx::toText(info));
-        return vlx::kDone;
-    }
-};
-
-struct StackCommand {
-    std::vector<std::string> images;
-    std::string dump;
-    std::vector<std::string> mappings;
-    vlx::StackOptions options;
-
-    void bind(CLI::App& app) {
-        app.description(
-            "Join images of the same view, rendered with different seeds, into a dump of one sample an image "
-            "a "
-            "pixel.\nRender each image with one sample a pixel, and features (albedo, normal, depth) if the "
-            "renderer has them.");
-        app.footer(
-            "Examples:\n"
-            "  vlx-pack stack cycles_*.exr -o room.exr\n"
-            "  vlx-pack stack a.exr b.exr -o ab.exr --map R=diffuse.r --map G=diffuse.g --map B=diffuse.b");
-        app.add_option("IMAGE", images, "Flat images of equal size")->required();
-        app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
-        using enum vlx::StackPreset;
-        vlx::addChoice(app, "--preset", options.preset,
-                       {{"auto", Auto}, {"cycles", Cycles}, {"plain", Plain}},
-                       "How channels are named. cycles: Blender's multilayer files with denoising data;\n"
-                       "plain: R, G, B and a dump's own names; auto: cycles when there is a Combined pass");
-        app.add_option(
-               "--map", mappings,
-               "Take a dump's channel from an image's, for example R=Combined.R; goes before the preset")
-            ->type_name("NAME=SOURCE")
-            ->expected(1)
-            ->take_all();
-        app.add_option("--renderer", options.renderer, "Name of the renderer, if the images do not tell");
-        using enum vlx::DumpCompression;
-        vlx::addChoice(app, "--compression", options.compression,
-                       {{"none", None}, {"rle", Rle}, {"zips", Zips}},
-                       "Of the dump. zips: small; rle: faster to write; none: fastest to read");
-    }
-
-    int run() {
-        for (const auto& mapping : mappings) {
-            const std::size_t sign = mapping.find('=');
-            if (sign == 0 || sign == std::string::npos || sign + 1 == mapping.size())
-                throw CLI::ValidationError("--map", "expected NAME=SOURCE, found '" + mapping + "'");
-            options.map[mapping.substr(0, sign)] = mapping.substr(sign + 1);
-        }
-        vlx::checkOutputName(dump, images);
-        vlx::StackReport report;
-        {
-            vlx::ProgressBar bar("stacking");
-            report = vlx::stackImages(images, dump, options, bar);
-        }
-        std::cout << dump << ": " << images.size() << " images\n";
-        for (const auto& [channel, source] : report.mapped)
-            std::cout << "  " << channel << " from " << source << "\n";
-        for (const auto& name : report.ignored) std::cout << "  left out: " << name << "\n";
-        for (const auto& note : report.notes) std::cout << note << "\n";
         return vlx::kDone;
     }
 };
@@ -149,9 +93,7 @@ struct SubsetCommand {
             ->capture_default_str();
         app.add_option("--seed", options.seed, "Another seed, another division into sub-sets")
             ->capture_default_str();
-        using enum vlx::DumpCompression;
-        vlx::addChoice(app, "--compression", options.compression,
-                       {{"none", None}, {"rle", Rle}, {"zips", Zips}}, "Of the dump");
+        vlx::addCompression(app, options.compression);
     }
 
     int run() const {
@@ -162,27 +104,59 @@ struct SubsetCommand {
     }
 };
 
+struct MergeCommand {
+    std::vector<std::string> parts;
+    std::string output;
+    vlx::MergeOptions options;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Join the parts of one picture, bands of rows or tiles, into one dump, or into one image when "
+            "the "
+            "parts\nare flat images. Values, types and attributes stay as they are.");
+        app.footer(
+            "Example:\n"
+            "  vlx-pack merge band_*.exr -o room.exr");
+        app.add_option("PART", parts,
+                       "All parts, in any order; #### in a name: all files with a number there")
+            ->required();
+        app.add_option("-o,--output", output, "The dump or image to write (.exr)")->required();
+        app.add_flag("--crop", options.crop, "The parts need only fill a rectangle of the picture");
+    }
+
+    int run() {
+        parts = vlx::expandSequences(parts);
+        vlx::checkOutputName(output, parts);
+        vlx::ProgressBar bar("merging");
+        vlx::mergeParts(parts, output, options, bar);
+        return vlx::kDone;
+    }
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
     CLI::App app("Sample dumps: what they hold, and how to make them of other renderers' images.",
                  "vlx-pack");
     app.require_subcommand(1);
+    std::vector<vlx::PackCommand> commands;
     InfoCommand info;
-    StackCommand stack;
     SampleCommand sample;
     SubsetCommand subset;
-    CLI::App* infoApp = app.add_subcommand("info");
-    CLI::App* stackApp = app.add_subcommand("stack");
-    CLI::App* sampleApp = app.add_subcommand("sample");
-    CLI::App* subsetApp = app.add_subcommand("subset");
-    info.bind(*infoApp);
-    stack.bind(*stackApp);
-    sample.bind(*sampleApp);
-    subset.bind(*subsetApp);
+    MergeCommand merge;
+    commands.push_back({app.add_subcommand("info"), [&] { return info.run(); }});
+    info.bind(*commands.back().app);
+    vlx::addImportCommands(app, commands);
+    commands.push_back({app.add_subcommand("sample"), [&] { return sample.run(); }});
+    sample.bind(*commands.back().app);
+    commands.push_back({app.add_subcommand("subset"), [&] { return subset.run(); }});
+    subset.bind(*commands.back().app);
+    commands.push_back({app.add_subcommand("merge"), [&] { return merge.run(); }});
+    merge.bind(*commands.back().app);
     return vlx::runTool(argc, argv, app, [&] {
-        if (infoApp->parsed()) return info.run();
-        if (subsetApp->parsed()) return subset.run();
-        return stackApp->parsed() ? stack.run() : sample.run();
+        const auto asked =
+            std::find_if(commands.begin(), commands.end(),
+                         [](const vlx::PackCommand& command) { return command.app->parsed(); });
+        return asked->run();  // one is required
     });
 }

@@ -3,7 +3,10 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <array>
+#include <atomic>
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <filesystem>
 
@@ -12,6 +15,38 @@
 namespace vlx {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+// Names that a signal handler can read: neither allocated nor locked.
+struct Slot {
+    enum State : int { Free, Changing, Live };
+    std::atomic<int> state{Free};
+    char path[PATH_MAX] = {};
+};
+std::array<Slot, 64> slots;
+static_assert(std::atomic<int>::is_always_lock_free);
+// The process is about to end: nothing is begun any more.
+std::atomic<bool> ending{false};
+
+// Number of the slot that names this file from now on; -1 when all are taken or the name is too long.
+int enterSlot(const std::string& path) {
+    if (path.size() >= PATH_MAX) return -1;
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+        int free = Slot::Free;
+        if (!slots[i].state.compare_exchange_strong(free, Slot::Changing)) continue;
+        std::memcpy(slots[i].path, path.c_str(), path.size() + 1);
+        slots[i].state = Slot::Live;
+        return static_cast<int>(i);
+    }
+    return -1;
+}
+
+void leaveSlot(int slot) {
+    if (slot >= 0) slots[static_cast<std::size_t>(slot)].state = Slot::Free;
+}
+
+}  // namespace
 
 OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
     const fs::path target(path_);
@@ -26,14 +61,20 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
     const fs::path name = "." + target.stem().string() + "." + std::to_string(::getpid()) + ".partial" +
                           target.extension().string();
     temporary_ = (target.parent_path() / name).string();
+    slot_ = enterSlot(fs::absolute(temporary_, ignored).string());
     const int descriptor = ::open(temporary_.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0666);
-    if (descriptor < 0)
-        throw Error(path_, std::string("expected to create this file: ") + std::strerror(errno));
-    ::close(descriptor);
+    const int code = errno;
+    if (descriptor >= 0) ::close(descriptor);
+    if (descriptor >= 0 && !ending) return;
+    if (descriptor >= 0) ::unlink(temporary_.c_str());
+    leaveSlot(slot_);
+    throw Error(path_, std::string("expected to create this file: ") +
+                           (descriptor < 0 ? std::strerror(code) : "the program is ending"));
 }
 
 OutputFile::~OutputFile() {
     if (!committed_) ::unlink(temporary_.c_str());
+    leaveSlot(slot_);
 }
 
 void OutputFile::commit() {
@@ -48,6 +89,12 @@ void OutputFile::commit() {
         throw Error(path_,
                     std::string("expected to give the finished file its name: ") + std::strerror(errno));
     committed_ = true;
+}
+
+void removeUnfinishedFiles() noexcept {
+    ending = true;
+    for (const Slot& slot : slots)
+        if (slot.state == Slot::Live) ::unlink(slot.path);
 }
 
 }  // namespace vlx

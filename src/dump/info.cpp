@@ -39,36 +39,14 @@ const char* compressionText(DumpCompression compression) {
 }
 
 std::vector<MissingPart> findMissing(const DumpInfo& info) {
-    const auto has = [&](std::initializer_list<const char*> names) {
-        return std::all_of(names.begin(), names.end(),
-                           [&](const char* name) { return findChannel(info.header, name) >= 0; });
-    };
-    std::vector<MissingPart> missing;
-    const auto lacks = [&](const std::string& what, const std::string& cost) {
-        missing.push_back({what, cost});
-    };
-    if (!has({"sample.x", "sample.y"}))
-        lacks("sample positions (sample.x, sample.y)",
-              "samples count as taken at their pixel's centre: nothing finer than a pixel can be told apart");
-    if (!has({"albedo.R", "albedo.G", "albedo.B"}))
-        lacks("albedo (albedo.R, albedo.G, albedo.B)",
-              "texture must be told from noise by radiance alone: it comes out softer");
-    if (!has({"N.X", "N.Y", "N.Z"}))
-        lacks("normals (N.X, N.Y, N.Z)", "edges and curvature of surfaces do not guide the reconstruction");
-    if (!has({"Z"})) lacks("distance (Z)", "borders between near and far do not guide the reconstruction");
-    if (!has({"A"}))
-        lacks("hit flag (A)", "pixels that see past the scene are not told apart, the image has no alpha");
-    if (!has({"sample.replicate"}))
-        lacks("replicates (sample.replicate)",
-              "samples count as independent: for low-discrepancy samples the error is overstated");
-    if (info.header.pixelFilter.empty())
-        lacks("pixel filter (variolux:pixelFilter)", "a box filter of one pixel is assumed");
-    if (info.maxSamples == 1)
-        lacks("a second sample in any pixel",
-              "the samples' noise can only be estimated from neighbouring pixels, not measured");
+    std::vector<MissingPart> missing = missingChannels(info.header);
+    if (info.maxSamples == 1 && findChannel(info.header, "variance.R") < 0)
+        missing.push_back(
+            {"a second sample in any pixel",
+             "the samples' noise can only be estimated from neighbouring pixels, not measured"});
     if (info.emptyPixels > 0)
-        lacks("samples in " + std::to_string(info.emptyPixels) + " pixels",
-              "these pixels are predicted from their neighbours");
+        missing.push_back({"samples in " + std::to_string(info.emptyPixels) + " pixels",
+                           "these pixels are predicted from their neighbours"});
     return missing;
 }
 
@@ -94,6 +72,34 @@ std::string bytesText(std::uint64_t bytes) {
 }
 
 }  // namespace
+
+std::vector<MissingPart> missingChannels(const DumpHeader& header) {
+    const auto has = [&](std::initializer_list<const char*> names) {
+        return std::all_of(names.begin(), names.end(),
+                           [&](const char* name) { return findChannel(header, name) >= 0; });
+    };
+    std::vector<MissingPart> missing;
+    const auto lacks = [&](const std::string& what, const std::string& cost) {
+        missing.push_back({what, cost});
+    };
+    if (!has({"sample.x", "sample.y"}))
+        lacks("sample positions (sample.x, sample.y)",
+              "samples count as taken at their pixel's centre: nothing finer than a pixel can be told apart");
+    if (!has({"albedo.R", "albedo.G", "albedo.B"}))
+        lacks("albedo (albedo.R, albedo.G, albedo.B)",
+              "texture must be told from noise by radiance alone: it comes out softer");
+    if (!has({"N.X", "N.Y", "N.Z"}))
+        lacks("normals (N.X, N.Y, N.Z)", "edges and curvature of surfaces do not guide the reconstruction");
+    if (!has({"Z"})) lacks("distance (Z)", "borders between near and far do not guide the reconstruction");
+    if (!has({"A"}))
+        lacks("hit flag (A)", "pixels that see past the scene are not told apart, the image has no alpha");
+    if (!has({"sample.replicate"}))
+        lacks("replicates (sample.replicate)",
+              "samples count as independent: for low-discrepancy samples the error is overstated");
+    if (header.pixelFilter.empty())
+        lacks("pixel filter (variolux:pixelFilter)", "a box filter of one pixel is assumed");
+    return missing;
+}
 
 DumpInfo inspectDump(const std::string& path, const Progress& progress) {
     const DumpReader reader(path);

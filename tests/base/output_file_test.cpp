@@ -1,6 +1,7 @@
 #include "variolux/base/output_file.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -38,6 +39,28 @@ TEST(OutputFile, UncommittedLeavesNothingAndKeepsTheOldFile) {
 }
 
 TEST(OutputFile, DoesNotReplaceADevice) { EXPECT_THROW(OutputFile("/dev/null"), Error); }
+
+// In a process of its own: afterwards no file can be written.
+TEST(OutputFileDeathTest, RemovesWhatIsUnfinishedAtTheEnd) {
+    const TemporaryFolder folder;
+    const auto end = [&] {
+        OutputFile whole(folder / "whole.exr"), unfinished(folder / "unfinished.exr");
+        std::ofstream(whole.temporaryPath()) << "whole";
+        std::ofstream(unfinished.temporaryPath()) << "half";
+        whole.commit();
+        removeUnfinishedFiles();
+        bool refused = false;
+        try {
+            OutputFile late(folder / "late.exr");
+        } catch (const Error&) {
+            refused = true;
+        }
+        ::_exit(refused ? 7 : 1);
+    };
+    EXPECT_EXIT(end(), testing::ExitedWithCode(7), "");
+    EXPECT_EQ(folder.entries(), 1);
+    EXPECT_TRUE(fs::exists(folder / "whole.exr"));
+}
 
 TEST(OutputFile, MissingFolderIsAnErrorThatNamesTheFile) {
     const TemporaryFolder folder;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -74,6 +75,40 @@ TEST(ProgressBar, DrawsOnATerminalAndCleansUp) {
     EXPECT_TRUE(drawn.starts_with("\rlabel  [")) << drawn;
     EXPECT_NE(drawn.find(" %"), std::string::npos);
     EXPECT_TRUE(drawn.ends_with("\r\033[K")) << "the line is erased in the end";
+}
+
+TEST(ProgressRecord, IsALineOfJson) {
+    EXPECT_EQ(progressRecord(LogFormat::Json, "kriging", 0.25, 10, 210.4),
+              "{\"event\":\"progress\",\"task\":\"kriging\",\"fraction\":0.25,\"seconds\":10.0,"
+              "\"secondsLeft\":30.0,\"peakMemoryMB\":210.0}\n");
+    EXPECT_NE(progressRecord(LogFormat::Json, "a", 0, 0, 1).find("\"secondsLeft\":null"), std::string::npos);
+    EXPECT_NE(progressRecord(LogFormat::Json, "a", 1, 0, 1).find("\"secondsLeft\":0.0"), std::string::npos);
+}
+
+TEST(ProgressRecord, IsWhatOpenJobDescriptionReads) {
+    EXPECT_EQ(progressRecord(LogFormat::OpenJd, "kriging", 0.256, 10, 210),
+              "openjd_status: kriging\nopenjd_progress: 25.6\n");
+    EXPECT_EQ(progressRecord(LogFormat::OpenJd, "kriging", 7, 10, 210),
+              "openjd_status: kriging\nopenjd_progress: 100.0\n");
+}
+
+TEST(ProgressBar, WritesFirstAndLastRecordsForPrograms) {
+    std::FILE* file = std::tmpfile();
+    setLogFormat(LogFormat::Json);
+    {
+        ProgressBar bar("label", file);
+        const Progress progress = bar;
+        ASSERT_TRUE(progress);
+        for (int i = 1; i <= 100; ++i) progress(i, 100);
+    }
+    setLogFormat(LogFormat::Text);
+    std::string written(4096, '\0');
+    std::rewind(file);
+    written.resize(std::fread(written.data(), 1, written.size(), file));
+    std::fclose(file);
+    EXPECT_NE(written.find("\"fraction\":0.01,"), std::string::npos) << written;
+    EXPECT_NE(written.find("\"fraction\":1.0,"), std::string::npos) << written;
+    EXPECT_EQ(std::count(written.begin(), written.end(), '\n'), 2) << written;
 }
 
 }  // namespace

@@ -40,10 +40,14 @@ ToolRun runTool(const std::string& tool, const std::vector<std::string>& argumen
         ::dup2(::open("/dev/null", O_RDONLY), STDIN_FILENO);
         ::dup2(::fileno(out), STDOUT_FILENO);
         ::dup2(::fileno(err), STDERR_FILENO);
-        if (options.fileSizeLimit) {
-            const rlimit limit{*options.fileSizeLimit, *options.fileSizeLimit};
-            ::setrlimit(RLIMIT_FSIZE, &limit);
-        }
+        const auto limit = [](decltype(RLIMIT_CPU) what, const std::optional<std::uint64_t>& most) {
+            if (!most) return;
+            const rlimit both{*most, *most};
+            ::setrlimit(what, &both);
+        };
+        limit(RLIMIT_FSIZE, options.fileSizeLimit);
+        limit(RLIMIT_AS, options.memoryBytes);
+        limit(RLIMIT_CPU, options.cpuSeconds);
         ::execv(program.c_str(), argv.data());
         ::_exit(127);
     }

@@ -15,7 +15,9 @@ struct ToolRun {
 };
 
 struct RunOptions {
-    std::optional<std::uint64_t> fileSizeLimit;  ///< bytes a file may grow to: stands for a full disk
+    std::optional<std::uint64_t> fileSizeLimit = {};  ///< bytes a file may grow to: stands for a full disk
+    std::optional<std::uint64_t> memoryBytes = {};    ///< of address space
+    std::optional<std::uint64_t> cpuSeconds = {};     ///< after which it counts as hanging
 };
 
 /// Runs a program of this build, for example runTool("vlx-compare", {"--version"}), without a shell and

@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include "help_formatter.h"
+#include "man_page.h"
 
 namespace vlx {
 namespace {
@@ -37,6 +38,25 @@ TEST(HelpFormatter, SetsEverythingIn80ColumnsAndSaysDefaultsAndNeeds) {
     EXPECT_NE(help.find("(default: 7)"), std::string::npos) << help;
     EXPECT_NE(help.find("A flag (needs --number)"), std::string::npos) << help;
     EXPECT_EQ(help.find("\n\n\n"), std::string::npos) << help;
+}
+
+TEST(ManPage, HoldsOptionsCommandsAndExamplesThatRoffTakesAsTheyAre) {
+    CLI::App app("Does things: many. And more.", "tool");
+    app.formatter(std::make_shared<HelpFormatter>());
+    bool flag = false;
+    app.add_flag("--flag", flag, ".dot and back\\slash");
+    CLI::App* const command = app.add_subcommand("command", "Does one thing.");
+    std::string file;
+    command->add_option("FILE", file, "A file")->required();
+    command->add_flag("--hidden", flag, "not shown")->group("");
+    command->footer("Example:\n  tool command 'a' --flag");
+    const std::string page = manPage(app, "1.2");
+    for (const char* part : {".TH TOOL 1 \"\" \"Variolux 1.2\"", "tool \\- Does things: many\n",
+                             "\\fBtool command\\fR \\fIFILE\\fR [\\fIOPTIONS\\fR]", ".SS tool command",
+                             "\\fB\\-\\-flag\\fR\n\\&.dot and back\\eslash\n",
+                             ".nf\nExample:\n  tool command 'a' \\-\\-flag\n.fi\n"})
+        EXPECT_NE(page.find(part), std::string::npos) << part << "\nin\n" << page;
+    EXPECT_EQ(page.find("hidden"), std::string::npos);
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ const std::vector<std::string> kCycles = {
 TEST(Stack, CyclesImagesBecomeSamples) {
     const TemporaryFolder folder;
     const auto images = writeImages(folder, 5, kCycles);
-    const StackReport report = stackImages(images, folder / "dump.exr", {});
+    const ImportReport report = stackImages(images, folder / "dump.exr", {});
 
     const DumpReader reader(folder / "dump.exr");
     EXPECT_EQ(reader.header().data, kWindow);
@@ -93,7 +93,7 @@ TEST(Stack, MapGoesBeforeThePreset) {
 TEST(Stack, PlainNames) {
     const TemporaryFolder folder;
     const auto images = writeImages(folder, 3, {"R", "G", "B", "N.X", "sample.x", "sample.y", "other"});
-    const StackReport report = stackImages(images, folder / "dump.exr", {});
+    const ImportReport report = stackImages(images, folder / "dump.exr", {});
     EXPECT_EQ(report.mapped.size(), 6u);
     EXPECT_EQ(report.ignored, std::vector<std::string>{"other"});
     const SampleBand band = DumpReader(folder / "dump.exr").read(kWindow.y + 40, 1, {"sample.y"});
@@ -111,7 +111,7 @@ TEST(Stack, DepthOfMissesBecomesZero) {
         images.push_back(folder / ("z" + std::to_string(images.size()) + ".exr"));
         writeImage(images.back(), image);
     }
-    const StackReport report = stackImages(images, folder / "dump.exr", {});
+    const ImportReport report = stackImages(images, folder / "dump.exr", {});
     const SampleBand band = DumpReader(folder / "dump.exr").read(0, 1, {"Z", "A"});
     EXPECT_EQ(band.values[0], (std::vector<float>{0, 0, 0, 0, 3.5f, 0}));
     EXPECT_EQ(band.values[1], std::vector<float>(6, 0.5f));

@@ -25,7 +25,12 @@ class OutputFile {
   private:
     std::string path_;
     std::string temporary_;
+    int slot_ = -1;
     bool committed_ = false;
 };
+
+/// Deletes the temporary files of all OutputFiles that are under construction (up to 64 at once). For a
+/// program's signal handler, before the process ends: async-signal-safe. Afterwards no commit() succeeds.
+void removeUnfinishedFiles() noexcept;
 
 }  // namespace vlx

@@ -51,6 +51,10 @@ struct DumpHeader {
 /// types.
 const std::vector<DumpChannel>& standardChannels();
 
+/// Known error variances of a sample's R, G, B, where a dump has them: of samples that are themselves means
+/// of many. Negative: not known. The variance of the mean of a pixel's n samples is their sum divided by n^2.
+inline constexpr std::string_view kVarianceChannels[] = {"variance.R", "variance.G", "variance.B"};
+
 /// Position of a channel in `header`, or -1.
 int findChannel(const DumpHeader& header, std::string_view name);
 

@@ -15,6 +15,9 @@ struct MissingPart {
     std::string cost;  ///< one sentence for a person
 };
 
+/// Channels and attributes that a dump with this header lacks, in the order of their use.
+std::vector<MissingPart> missingChannels(const DumpHeader& header);
+
 /// What `vlx-pack info` prints.
 struct DumpInfo {
     std::string path;
@@ -27,7 +30,7 @@ struct DumpInfo {
     double meanSamples = 0;
     std::uint64_t emptyPixels = 0;       ///< pixels without samples
     std::uint64_t nonFiniteSamples = 0;  ///< samples with a NaN or infinite R, G or B
-    std::uint32_t replicates = 0;  ///< different values of sample.replicate; 0 without the channel
+    std::uint32_t replicates = 0;        ///< different values of sample.replicate; 0 without the channel
     std::vector<MissingPart> missing;
 };
 

@@ -1,11 +1,15 @@
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <thread>
+#include <vector>
 
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/compare/gaussian.h"
 #include "variolux/compare/metrics.h"
 #include "variolux/dump/reader.h"
+#include "variolux/dump/sample_writer.h"
 #include "variolux/dump/writer.h"
 #include "variolux/geostat/variogram_model.h"
 
@@ -46,6 +50,37 @@ void useDumps() {
            "samples read back as they were written");
 }
 
+// A renderer: tiles, one thread each, with samples at random places.
+void renderTiles() {
+    constexpr int kSize = 64, kTile = 16, kSamples = 4;
+    vlx::DumpHeader header;
+    header.data = header.display = vlx::Window{0, 0, kSize, kSize};
+    header.channels = {{"R"}, {"G"}, {"B"}, {"sample.x"}, {"sample.y"}};
+    header.renderer = "consumer";
+    header.samples = kSamples;
+    vlx::SampleWriter writer("consumer_tiles.exr", header);
+    std::vector<std::thread> threads;
+    for (int y = 0; y < kSize; y += kTile)
+        threads.emplace_back([&writer, y] {
+            for (int x = 0; x < kSize; x += kTile) {
+                vlx::SampleTile tile = writer.tile({x, y, kTile, kTile});
+                for (int py = y; py < y + kTile; ++py)
+                    for (int px = x; px < x + kTile; ++px)
+                        for (int i = 0; i < kSamples; ++i) {
+                            const float u = static_cast<float>(px) + static_cast<float>(i) / kSamples;
+                            const float v = static_cast<float>(py) + 0.5f;
+                            tile.add(px, py, std::array{u, v, u * v, u, v});
+                        }
+                writer.add(std::move(tile));
+            }
+        });
+    for (auto& thread : threads) thread.join();
+    writer.close();
+    const vlx::SampleBand band = vlx::DumpReader("consumer_tiles.exr").read(10, 1, {"R", "sample.x"});
+    expect(band.samples() == kSize * kSamples && band.values[0] == band.values[1],
+           "a renderer's tiles become a dump");
+}
+
 void useGeostatistics() {
     vlx::VariogramModel model;
     model.nugget = 0.25;
@@ -60,6 +95,7 @@ int main() {
     try {
         useImages();
         useDumps();
+        renderTiles();
         useGeostatistics();
     } catch (const vlx::Error& error) {
         std::fprintf(stderr, "failed: %s\n", error.what());

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "variolux/base/window.h"
+
+namespace vlx {
+
+/// "a, b, c".
+std::string listed(const std::vector<std::string>& names);
+
+bool contains(const std::vector<std::string>& names, const std::string& name);
+
+/// A channel of one of a set of images.
+struct FlatChannel {
+    std::size_t image = 0;
+    std::size_t index = 0;  ///< among the channels taken from that image
+};
+
+/// Channels of flat images of equal windows, read by bands of rows: what importers take samples from. Files
+/// stay open between bands as long as systems allow so many. Memory is a band of the channels taken.
+class FlatImages {
+  public:
+    /// Opens all images. Throws Error when one cannot be read, is deep, or has other windows than the first.
+    explicit FlatImages(std::vector<std::string> paths);
+    ~FlatImages();
+
+    std::size_t size() const;
+    const std::string& path(std::size_t image) const;
+    const std::vector<std::string>& channels(std::size_t image) const;
+    const Window& data() const;
+    const Window& display() const;
+    /// Text attribute of an image, empty when it has none of this name.
+    std::string text(std::size_t image, const std::string& attribute) const;
+    /// Number attribute of an image.
+    std::optional<double> number(std::size_t image, const std::string& attribute) const;
+
+    /// From now on, read() reads this channel too. Throws Error when the image has no such channel.
+    FlatChannel take(std::size_t image, const std::string& channel);
+
+    /// Rows a band may have so that `values` floats a pixel stay within a fixed memory.
+    int bandRows(std::size_t values) const;
+
+    /// Reads the rows [y, y + rows) of all channels taken; images are read in parallel. Throws Error.
+    void read(int y, int rows);
+
+    /// Of pixel `pixel`, counted row by row, of the rows read last.
+    float value(FlatChannel channel, std::size_t pixel) const;
+
+    /// Hash of all values read of an image so far: equal for images that are identical.
+    std::uint64_t hash(std::size_t image) const;
+
+  private:
+    class Source;
+    std::vector<std::unique_ptr<Source>> sources_;
+};
+
+}  // namespace vlx

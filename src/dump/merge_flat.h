@@ -1,0 +1,11 @@
+#pragma once
+
+#include "variolux/dump/merge.h"
+
+namespace vlx {
+
+/// mergeParts() for flat images.
+MergeReport mergeFlat(const std::vector<std::string>& paths, const std::string& output,
+                      const MergeOptions& options, const Progress& progress);
+
+}  // namespace vlx

@@ -1,0 +1,198 @@
+#include "variolux/dump/moments.h"
+
+#include <array>
+
+#include "channel_presets.h"
+#include "flat_images.h"
+#include "moment_rows.h"
+#include "origins.h"
+#include "variolux/base/error.h"
+
+namespace vlx {
+
+namespace {
+
+// What a preset knows: layers in the order of preference.
+struct Convention {
+    Names colour, variance, albedo, normal, depth, alpha;
+    std::optional<VarianceMeaning> meaning;
+    bool xyz = false;
+};
+
+Convention conventionOf(MomentPreset preset) {
+    using enum VarianceMeaning;
+    switch (preset) {
+        case MomentPreset::Pbrt:
+            return {{""}, {"Variance"}, {"Albedo"}, {"Ns", "N"}, {}, {}, OfSample, true};
+        case MomentPreset::Tungsten:
+            return {{""}, {"variance"}, {"albedo"}, {"normal", "N"}, {"depth", "Z"}, {"A"}, OfMean, false};
+        case MomentPreset::Arnold:
+            return {{"", "RGBA", "beauty"},
+                    {"variance", "RGBA_variance"},
+                    {"denoise_albedo", "diffuse_albedo", "albedo"},
+                    {"N"},
+                    {"Z"},
+                    {"A", "RGBA.A"},
+                    OfSample,
+                    false};
+        case MomentPreset::RenderMan:
+            return {{"", "Ci"},         {"mse"}, {"albedo"}, {"normal", "Nn"}, {"zfiltered", "z"},
+                    {"A", "a", "Ci.A"}, OfMean,  false};
+        case MomentPreset::Mitsuba:
+            return {{""}, {}, {}, {}, {}, {"A"}, SecondMoment, true};
+        default:
+            return {{""},           {"variance", "Variance", "var"},
+                    {"albedo"},     {"N", "normal"},
+                    {"Z", "depth"}, {"A"},
+                    std::nullopt,   false};
+    }
+}
+
+// Names I of nested integrators whose second moments m2_I.X are there; AOVs inside I have longer names.
+Names nestedIntegrators(const Names& names) {
+    Names nested;
+    for (const auto& name : names)
+        if (name.starts_with("m2_") && name.ends_with(".X") && name.find('.') == name.size() - 2)
+            nested.push_back(name.substr(3, name.size() - 5));
+    return nested;
+}
+
+MomentPreset recognise(const Names& names) {
+    if (!nestedIntegrators(names).empty()) return MomentPreset::Mitsuba;
+    if (contains(names, "RelativeVariance.R")) return MomentPreset::Pbrt;
+    if (findTriple(names, {"mse"})) return MomentPreset::RenderMan;
+    if (findTriple(names, {"variance"}) && !contains(names, "Variance.R")) return MomentPreset::Arnold;
+    return MomentPreset::Plain;
+}
+
+const char* nameOf(VarianceMeaning meaning) {
+    switch (meaning) {
+        case VarianceMeaning::OfSample:
+            return "the variance of a single sample";
+        case VarianceMeaning::SecondMoment:
+            return "the second moment";
+        default:
+            return "the variance of the mean";
+    }
+}
+
+ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& convention) {
+    ChannelMap map;
+    if (preset == MomentPreset::Mitsuba) {
+        const Names nested = nestedIntegrators(names);
+        const std::string own = nested.empty() ? "" : nested.front() + ".";
+        Names albedo, normal;
+        for (const auto& prefix : {own, std::string()}) {
+            for (const char* name : {"albedo", "alb"}) albedo.push_back(prefix + name);
+            for (const char* name : {"sh_normal", "normals", "nn", "N", "geo_normal"})
+                normal.push_back(prefix + name);
+        }
+        enter(map, "albedo", findTriple(names, albedo));
+        enter(map, "N", findTriple(names, normal));
+        for (const auto& name : names)
+            if (name.ends_with(".T") && !name.starts_with("m2_")) map.try_emplace("Z", name);
+        Names colours = {""};
+        for (const auto& name : nested) colours.push_back(name);
+        enter(map, "", findTriple(names, colours));
+        if (!nested.empty())
+            for (const char* c : {"R", "G", "B"})
+                map[std::string("variance.") + c] = "m2_" + nested.front() + "." +
+                                                    (*c == 'R'   ? "X"
+                                                     : *c == 'G' ? "Y"
+                                                                 : "Z");
+    } else {
+        enter(map, "", findTriple(names, convention.colour));
+        enter(map, "variance", findTriple(names, convention.variance));
+        enter(map, "albedo", findTriple(names, convention.albedo));
+        enter(map, "N", findTriple(names, convention.normal));
+        if (const auto depth = findNumber(names, convention.depth)) map["Z"] = *depth;
+    }
+    for (const auto& alpha : convention.alpha)
+        if (contains(names, alpha)) map.try_emplace("A", alpha);
+    return map;
+}
+
+bool isFeature(const std::string& channel) {
+    return channel.size() > 1 ? !channel.starts_with("variance.") : channel == "A" || channel == "Z";
+}
+
+}  // namespace
+
+ImportReport importMoments(const std::string& image, const std::string& dump, const MomentOptions& options,
+                           const Progress& progress) {
+    std::vector<std::string> paths = {image};
+    Companions companions(options.with);
+    companions.appendTo(paths);
+    FlatImages images(paths);
+    const Names& names = images.channels(0);
+    const MomentPreset preset = options.preset == MomentPreset::Auto ? recognise(names) : options.preset;
+    const Convention convention = conventionOf(preset);
+
+    Origins origins;
+    for (const auto& [channel, name] : presetMap(names, preset, convention)) origins[channel] = {0, name};
+    companions.enterInto(origins, images);
+    for (const auto& [channel, name] : options.map) {
+        if (channel == "sample.replicate") throw Error(image, "sample.replicate cannot be mapped");
+        origins[channel] = {0, name};
+    }
+    for (const char* channel : {"R", "G", "B"}) require(images, origins, channel, "say it with a mapping");
+    for (const char* channel : {"variance.R", "variance.G", "variance.B"})
+        require(images, origins, channel, "a mapping or another image can hold the variance");
+
+    MomentSource source;
+    source.images = &images;
+    const auto meaning = options.meaning ? options.meaning : convention.meaning;
+    if (!meaning)
+        throw Error(image, "no renderer is known by these channels: say what its variance means, " +
+                               std::string("or name a preset; the image has ") + listed(names));
+    source.meaning = *meaning;
+    source.xyz = options.xyz.value_or(convention.xyz);
+    source.samples = options.samples > 0 ? options.samples : images.number(0, "samplesPerPixel").value_or(0);
+    const double least = source.meaning == VarianceMeaning::SecondMoment ? 2
+                         : source.meaning == VarianceMeaning::OfSample   ? 1
+                                                                         : 0;
+    if (source.samples < least)
+        throw Error(image, std::string("its variance is ") + nameOf(source.meaning) +
+                               ": expected the number of samples a pixel, found none in the file");
+    source.mean = takeThree(images, origins, {"R", "G", "B"});
+    source.variance = takeThree(images, origins, {"variance.R", "variance.G", "variance.B"});
+    if (source.meaning == VarianceMeaning::SecondMoment) {
+        // The first moments that belong to second ones named m2_...
+        std::array<FlatChannel, 3> first;
+        bool found = true;
+        for (std::size_t c = 0; c < 3; ++c) {
+            const Origin& second = origins.at(std::string("variance.") + "RGB"[c]);
+            found = found && second.channel.starts_with("m2_") &&
+                    contains(images.channels(second.image), second.channel.substr(3));
+            if (found) first[c] = images.take(second.image, second.channel.substr(3));
+        }
+        if (found) source.first = first;
+        if (!found && source.xyz)
+            throw Error(image,
+                        "second moments of X, Y, Z need their means: expected channels named like them "
+                        "without m2_; the image has " +
+                            listed(names));
+    }
+    for (const auto& [channel, origin] : origins)
+        if (isFeature(channel))
+            source.features.emplace_back(channel, images.take(origin.image, origin.channel));
+
+    ImportReport report;
+    describe(images, origins, 1, report);
+    report.notes.push_back(std::string("The variance is taken as ") + nameOf(source.meaning) +
+                           (least > 0 ? ", of " + std::to_string(source.samples) + " samples." : "."));
+    if (preset == MomentPreset::Pbrt)
+        report.notes.push_back(
+            "pbrt's variance leaves out samples that hit nothing: where a pixel sees past the scene it is "
+            "too "
+            "small or too large.");
+    if (preset == MomentPreset::Arnold)
+        report.notes.push_back("Arnold's samples a pixel are the square of its AA samples.");
+    writeMoments(source,
+                 {dump, options.renderer.empty() ? images.text(0, "Software") : options.renderer,
+                  options.halves, options.seed, options.compression},
+                 report, progress);
+    return report;
+}
+
+}  // namespace vlx

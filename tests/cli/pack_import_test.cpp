@@ -1,0 +1,144 @@
+// vlx-pack's importers from the command line: what they print, and how they fail.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "../dump/renderer_files.h"
+#include "../dump/test_dumps.h"
+#include "run_tool.h"
+#include "temporary_folder.h"
+#include "variolux/base/image_io.h"
+#include "variolux/dump/reader.h"
+
+namespace vlx {
+namespace {
+
+ToolRun pack(const std::vector<std::string>& arguments) { return runTool("vlx-pack", arguments); }
+
+struct Sources {
+    Sources() {
+        writeBytes(folder / "s.raw", bcdRawBytes({}));
+        SbmcTileFile tile;
+        for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {0, 4}, {4, 4}}) {
+            tile.x = x;
+            tile.y = y;
+            writeBytes(folder / ("t" + std::to_string(x) + std::to_string(y) + ".bin"), sbmcTileBytes(tile));
+        }
+        const auto value = [](int c, int x, int y) { return static_cast<float>(c + x + y); };
+        writeImage(folder / "a_0001.exr", imageOf({0, 0, 4, 3}, {"R", "G", "B"}, value));
+        writeImage(folder / "a_0002.exr", imageOf({0, 0, 4, 3}, {"R", "G", "B", "A"}, value));
+        writeImage(folder / "mse.exr",
+                   imageOf({0, 0, 4, 3}, {"R", "G", "B", "mse.R", "mse.G", "mse.B"}, value));
+    }
+    const TemporaryFolder folder;
+    const std::string out = folder / "d.exr";
+};
+
+TEST(VlxPackImport, EachCommandSaysWhatItTookAndWhatIsMissing) {
+    const Sources s;
+    const std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>> cases = {
+        {{"stack", s.folder / "a_####.exr", "-o", s.out}, {"2 images", "R from R", "lacks albedo"}},
+        {{"buffers", s.folder / "a_0001.exr", s.folder / "a_0002.exr", "-o", s.out},
+         {"two half-buffers", "lacks variances"}},
+        {{"moments", s.folder / "mse.exr", "-o", s.out},
+         {"variance.R from mse.R", "the variance of the mean", "lacks single samples"}},
+        {{"bcd", s.folder / "s.raw", "-o", s.out}, {"3 samples in each pixel", "lacks sample positions"}},
+        {{"sbmc", s.folder / "t00.bin", s.folder / "t40.bin", s.folder / "t04.bin", s.folder / "t44.bin",
+          "-o", s.out},
+         {"4 tiles of SBMC", "left out: the reference", "A from hasHit"}}};
+    for (const auto& [arguments, parts] : cases) {
+        const ToolRun run = pack(arguments);
+        EXPECT_EQ(run.exitCode, 0) << run.err;
+        EXPECT_EQ(run.err, "");
+        for (const std::string& part : parts)
+            EXPECT_NE(run.out.find(part), std::string::npos) << part << run.out;
+        EXPECT_NO_THROW(DumpReader(s.out).header());
+        EXPECT_EQ(pack({"info", s.out}).exitCode, 0);
+    }
+}
+
+TEST(VlxPackImport, BadUsageAndFailures) {
+    const Sources s;
+    const std::string raw = s.folder / "s.raw", image = s.folder / "mse.exr";
+    for (const std::vector<std::string>& arguments : {std::vector<std::string>{"bcd", raw, raw, "-o", s.out},
+                                                      {"bcd", image, "-o", s.out},
+                                                      {"bcd", raw},
+                                                      {"moments", image, "-o", s.out, "--variance-is", "big"},
+                                                      {"moments", image, "-o", s.out, "--samples", "0"},
+                                                      {"moments", image, "-o", image},
+                                                      {"moments", image, "-o", s.out, "--map", "R"},
+                                                      {"buffers", image, "-o", s.out},
+                                                      {"sbmc", "-o", s.out},
+                                                      {"merge", image},
+                                                      {"merge", image, "-o", s.out, "--log", "loud"}}) {
+        const ToolRun run = pack(arguments);
+        EXPECT_EQ(run.exitCode, 2) << run.err;
+        EXPECT_TRUE(run.err.starts_with("vlx-pack: ")) << run.err;
+    }
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"bcd", s.folder / "t00.bin", "-o", s.out},
+          {"sbmc", raw, "-o", s.out},
+          {"sbmc", s.folder / "t00.bin", s.folder / "t44.bin", "-o", s.out},
+          {"stack", s.folder / "b_####.exr", "-o", s.out},
+          {"moments", s.folder / "a_0001.exr", "-o", s.out},
+          {"moments", image, "-o", s.out, "--preset", "mitsuba"},
+          {"merge", s.folder / "none.exr", "-o", s.out}}) {
+        const ToolRun run = pack(arguments);
+        EXPECT_EQ(run.exitCode, 1) << run.err;
+        EXPECT_TRUE(run.err.starts_with("vlx-pack: /")) << run.err;
+    }
+    EXPECT_FALSE(std::filesystem::exists(s.out));
+}
+
+TEST(VlxPackMerge, BandsBecomeOneFile) {
+    const Sources s;
+    for (int i = 0; i < 2; ++i) {
+        Image band({0, 2 * i, 4, 2}, {"R", "G", "B"});
+        band.display = {0, 0, 4, 4};
+        writeImage(s.folder / ("band_000" + std::to_string(i) + ".exr"), band);
+    }
+    EXPECT_EQ(pack({"merge", s.folder / "band_####.exr", "-o", s.out}).exitCode, 0);
+    EXPECT_EQ(readImage(s.out).data, (Window{0, 0, 4, 4}));
+    const ToolRun missing = pack({"merge", s.folder / "band_0001.exr", "-o", s.out});
+    EXPECT_EQ(missing.exitCode, 1);
+    EXPECT_NE(missing.err.find("no part holds rows 0 to 1"), std::string::npos) << missing.err;
+}
+
+TEST(ToolLog, JsonLinesOnStandardErrorAndOpenJdOnStandardOutput) {
+    const Sources s;
+    const ToolRun json = pack({"stack", s.folder / "a_0001.exr", "-o", s.out, "--log", "json"});
+    EXPECT_EQ(json.exitCode, 0);
+    std::vector<nlohmann::json> records;
+    std::istringstream lines(json.err);
+    for (std::string line; std::getline(lines, line);) records.push_back(nlohmann::json::parse(line));
+    ASSERT_GE(records.size(), 2u);
+    EXPECT_EQ(records.front()["event"], "progress");
+    EXPECT_EQ(records.front()["task"], "stacking");
+    EXPECT_EQ(records[records.size() - 2]["fraction"], 1.0);
+    EXPECT_EQ(records.back()["event"], "end");
+    EXPECT_EQ(records.back()["exitCode"], 0);
+
+    const ToolRun failed = pack({"--log", "json", "stack", s.folder / "no.exr", "-o", s.out});
+    EXPECT_EQ(failed.exitCode, 1);
+    const auto end = nlohmann::json::parse(failed.err);
+    EXPECT_EQ(end["exitCode"], 1);
+    EXPECT_NE(end["message"].get<std::string>().find("no.exr: expected an image"), std::string::npos);
+
+    const ToolRun openjd = pack({"stack", s.folder / "a_0001.exr", "-o", s.out, "--log", "openjd"});
+    EXPECT_NE(openjd.out.find("openjd_progress: 100.0\n"), std::string::npos) << openjd.out;
+    EXPECT_EQ(openjd.err, "");
+}
+
+TEST(ToolHelp, EndsWithTheExitCodesAndKnowsItsManualPage) {
+    EXPECT_NE(pack({"--help"}).out.find("Exit codes: 0 done; 1"), std::string::npos);
+    const ToolRun page = pack({"--help-man"});
+    EXPECT_EQ(page.exitCode, 0);
+    EXPECT_TRUE(page.out.starts_with(".TH VLX\\-PACK 1")) << page.out.substr(0, 80);
+    EXPECT_NE(page.out.find(".SS vlx\\-pack moments"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vlx

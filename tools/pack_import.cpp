@@ -1,0 +1,310 @@
+// The commands of vlx-pack that make dumps of other renderers' files.
+
+#include <iostream>
+#include <memory>
+
+#include "pack_commands.h"
+#include "progress_bar.h"
+#include "tool_main.h"
+#include "variolux/dump/bcd.h"
+#include "variolux/dump/moments.h"
+#include "variolux/dump/sbmc.h"
+#include "variolux/dump/stack.h"
+
+namespace vlx {
+
+namespace {
+
+ChannelMap parseMappings(const std::vector<std::string>& mappings) {
+    ChannelMap map;
+    for (const auto& mapping : mappings) {
+        const std::size_t sign = mapping.find('=');
+        if (sign == 0 || sign == std::string::npos || sign + 1 == mapping.size())
+            throw CLI::ValidationError("--map", "expected NAME=SOURCE, found '" + mapping + "'");
+        map[mapping.substr(0, sign)] = mapping.substr(sign + 1);
+    }
+    return map;
+}
+
+// What every importer has: an output, how it is written, and the report on standard output.
+struct ImportCommand {
+    std::string dump;
+    std::string renderer;
+    DumpCompression compression = DumpCompression::Zips;
+    std::vector<std::string> mappings;
+
+    void bindOutput(CLI::App& app) {
+        app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
+        app.add_option("--renderer", renderer, "Name of the renderer, if the files do not tell");
+        addCompression(app, compression);
+    }
+    void bindMap(CLI::App& app) {
+        app.add_option(
+               "--map", mappings,
+               "Take a dump's channel from an image's, for example R=Combined.R; goes before the preset")
+            ->type_name("NAME=SOURCE")
+            ->expected(1)
+            ->take_all();
+    }
+    int print(const ImportReport& report, const std::string& what) const {
+        std::cout << dump << ": " << what << "\n";
+        for (const auto& [channel, source] : report.mapped)
+            std::cout << "  " << channel << " from " << source << "\n";
+        for (const auto& name : report.ignored) std::cout << "  left out: " << name << "\n";
+        for (const auto& part : report.missing)
+            std::cout << "  lacks " << part.what << ": " << part.cost << "\n";
+        for (const auto& note : report.notes) std::cout << note << "\n";
+        return kDone;
+    }
+};
+
+void bindCompanions(CLI::App& app, CompanionImages& with) {
+    app.add_option("--albedo", with.albedo, "Image of the albedo, if it is not in the same file");
+    app.add_option("--normal", with.normal, "Image of the normals, likewise");
+    app.add_option("--depth", with.depth, "Image of the distance, likewise");
+}
+
+struct StackCommand : ImportCommand {
+    std::vector<std::string> images;
+    StackPreset preset = StackPreset::Auto;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Join images of the same view, rendered with different seeds, into a dump of one sample an image "
+            "a "
+            "pixel.\nRender each image with one sample a pixel, and features (albedo, normal, depth) if the "
+            "renderer has them.");
+        app.footer(
+            "Examples:\n"
+            "  vlx-pack stack cycles_*.exr -o room.exr\n"
+            "  vlx-pack stack 'seed_####.exr' -o room.exr --preset mitsuba\n"
+            "  vlx-pack stack a.exr b.exr -o ab.exr --map R=diffuse.r --map G=diffuse.g --map B=diffuse.b");
+        app.add_option("IMAGE", images,
+                       "Flat images of equal size; #### in a name: all files with a number there")
+            ->required();
+        using enum StackPreset;
+        addChoice(
+            app, "--preset", preset,
+            {{"auto", Auto}, {"cycles", Cycles}, {"mitsuba", Mitsuba}, {"pbrt", Pbrt}, {"plain", Plain}},
+            "How channels are named. cycles: Blender's multilayer files with denoising data;\n"
+            "mitsuba: the aov integrator's; pbrt: the gbuffer film's; plain: R, G, B and a dump's own\n"
+            "names; auto: what the names look like");
+        bindMap(app);
+        bindOutput(app);
+    }
+
+    int run() {
+        const StackOptions options{preset, parseMappings(mappings), renderer, compression};
+        images = expandSequences(images);
+        checkOutputName(dump, images);
+        ImportReport report;
+        {
+            ProgressBar bar("stacking");
+            report = stackImages(images, dump, options, bar);
+        }
+        return print(report, std::to_string(images.size()) + " images");
+    }
+};
+
+struct BuffersCommand : ImportCommand {
+    std::string a, b;
+    BufferOptions options;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Join two half-buffers, each the mean of half of a pixel's samples, into a dump of two samples a "
+            "pixel.");
+        app.footer(
+            "Example, of Tungsten's files:\n"
+            "  vlx-pack buffers colorA.exr colorB.exr -o room.exr --variance colorVariance.exr\n"
+            "      --albedo albedo.exr --normal normal.exr --depth depth.exr");
+        app.add_option("A", a, "Image of the first half")->required();
+        app.add_option("B", b, "Image of the second half")->required();
+        app.add_option("--variance", options.with.variance,
+                       "Image of the variance of the mean of both halves (Tungsten's, RenderMan's mse)");
+        bindCompanions(app, options.with);
+        bindMap(app);
+        bindOutput(app);
+    }
+
+    int run() {
+        options.map = parseMappings(mappings);
+        options.renderer = renderer;
+        options.compression = compression;
+        checkOutputName(dump, {a, b, options.with.variance, options.with.albedo, options.with.normal,
+                               options.with.depth});
+        ImportReport report;
+        {
+            ProgressBar bar("joining");
+            report = importBuffers(a, b, dump, options, bar);
+        }
+        return print(report, "two half-buffers");
+    }
+};
+
+// Options of sources that have no samples but moments.
+void bindHalves(CLI::App& app, double& samples, bool& single, std::uint64_t& seed) {
+    app.add_option("--samples", samples, "Samples a pixel, where the variance is of single ones")
+        ->check(CLI::Range(1.0, 1e9));
+    app.add_flag("--single", single,
+                 "One sample a pixel; else two artificial halves whose noise has nothing in common");
+    app.add_option("--seed", seed, "Of the halves")->capture_default_str();
+}
+
+struct MomentsCommand : ImportCommand {
+    enum class Meaning { Preset, Sample, Mean, Second };
+    enum class Colours { Preset, Rgb, Xyz };
+    std::string image;
+    Meaning meaning = Meaning::Preset;
+    Colours colours = Colours::Preset;
+    bool single = false;
+    MomentOptions options;
+
+    void bind(CLI::App& app) {
+        app.description("Make a dump of an image that has a variance for each pixel.");
+        app.footer(
+            "Examples:\n"
+            "  vlx-pack moments pbrt_gbuffer.exr -o room.exr\n"
+            "  vlx-pack moments mitsuba.exr -o room.exr --samples 64\n"
+            "  vlx-pack moments color.exr -o room.exr --preset tungsten --variance colorVariance.exr");
+        app.add_option("IMAGE", image, "Flat image")->required();
+        using enum MomentPreset;
+        addChoice(app, "--preset", options.preset,
+                  {{"auto", Auto},
+                   {"pbrt", Pbrt},
+                   {"mitsuba", Mitsuba},
+                   {"tungsten", Tungsten},
+                   {"arnold", Arnold},
+                   {"renderman", RenderMan},
+                   {"plain", Plain}},
+                  "Whose channels and whose idea of variance; plain: R, G, B and variance.R, .G, .B");
+        addChoice(app, "--variance-is", meaning,
+                  {{"preset", Meaning::Preset},
+                   {"sample", Meaning::Sample},
+                   {"mean", Meaning::Mean},
+                   {"second-moment", Meaning::Second}},
+                  "Of a single sample, of the pixel's mean, or the mean of squares");
+        addChoice(app, "--variance-of", colours,
+                  {{"preset", Colours::Preset}, {"rgb", Colours::Rgb}, {"xyz", Colours::Xyz}},
+                  "Colours that the variance belongs to: pbrt's default sensor and Mitsuba have X, Y, Z");
+        app.add_option("--variance", options.with.variance, "Image of the variance, if it is another file");
+        bindCompanions(app, options.with);
+        bindHalves(app, options.samples, single, options.seed);
+        bindMap(app);
+        bindOutput(app);
+    }
+
+    int run() {
+        options.map = parseMappings(mappings);
+        options.renderer = renderer;
+        options.compression = compression;
+        options.halves = !single;
+        if (meaning == Meaning::Sample) options.meaning = VarianceMeaning::OfSample;
+        if (meaning == Meaning::Mean) options.meaning = VarianceMeaning::OfMean;
+        if (meaning == Meaning::Second) options.meaning = VarianceMeaning::SecondMoment;
+        if (colours != Colours::Preset) options.xyz = colours == Colours::Xyz;
+        checkOutputName(dump, {image, options.with.variance, options.with.albedo, options.with.normal,
+                               options.with.depth});
+        ImportReport report;
+        {
+            ProgressBar bar("reading");
+            report = importMoments(image, dump, options, bar);
+        }
+        return print(report, "means and variances");
+    }
+};
+
+struct BcdCommand : ImportCommand {
+    std::vector<std::string> files;
+    bool single = false;
+    BcdOptions options;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Make a dump of files for the denoiser BCD: its raw samples, or the image, covariances and "
+            "histogram.");
+        app.footer(
+            "Examples:\n"
+            "  vlx-pack bcd samples.raw -o room.exr\n"
+            "  vlx-pack bcd room.exr room_cov.exr room_hist.exr -o dump.exr\n"
+            "  vlx-pack bcd room.exr room_cov.exr -o dump.exr --samples 16");
+        app.add_option("FILE", files, "A raw file; or image, covariances and histogram, in this order")
+            ->required()
+            ->expected(1, 3);
+        bindHalves(app, options.samples, single, options.seed);
+        bindOutput(app);
+    }
+
+    int run() {
+        options.renderer = renderer;
+        options.compression = compression;
+        options.halves = !single;
+        checkOutputName(dump, files);
+        const bool raw = !isOpenExr(files.front());
+        if (raw != (files.size() == 1))
+            throw CLI::ValidationError("FILE",
+                                       raw ? "expected one raw file or images, found several files that "
+                                             "start with a raw one"
+                                           : "expected an image and its covariances, found one image");
+        ImportReport report;
+        {
+            ProgressBar bar("reading");
+            report = raw ? importBcdRaw(files[0], dump, options, bar)
+                         : importBcdStatistics(files[0], files[1], files.size() > 2 ? files[2] : "", dump,
+                                               options, bar);
+        }
+        return print(report, raw ? "raw samples of BCD" : "statistics of BCD");
+    }
+};
+
+struct SbmcCommand : ImportCommand {
+    std::vector<std::string> tiles;
+
+    void bind(CLI::App& app) {
+        app.description("Make a dump of the sample files of SBMC, one tile a file.");
+        app.footer(
+            "Example:\n"
+            "  vlx-pack sbmc room/*.bin -o room.exr");
+        app.add_option("TILE", tiles, "All tiles of a picture, or some that fill a rectangle")->required();
+        bindOutput(app);
+    }
+
+    int run() {
+        SbmcOptions options;
+        if (!renderer.empty()) options.renderer = renderer;
+        options.compression = compression;
+        checkOutputName(dump, tiles);
+        ImportReport report;
+        {
+            ProgressBar bar("reading");
+            report = importSbmc(tiles, dump, options, bar);
+        }
+        return print(report, std::to_string(tiles.size()) + " tiles of SBMC");
+    }
+};
+
+template <class Command>
+void add(CLI::App& app, const std::string& name, std::vector<PackCommand>& commands) {
+    const auto command = std::make_shared<Command>();
+    CLI::App* const sub = app.add_subcommand(name);
+    command->bind(*sub);
+    commands.push_back({sub, [command] { return command->run(); }});
+}
+
+}  // namespace
+
+void addCompression(CLI::App& app, DumpCompression& compression) {
+    using enum DumpCompression;
+    addChoice(app, "--compression", compression, {{"none", None}, {"rle", Rle}, {"zips", Zips}},
+              "Of the dump. zips: small; rle: faster to write; none: fastest to read");
+}
+
+void addImportCommands(CLI::App& app, std::vector<PackCommand>& commands) {
+    add<StackCommand>(app, "stack", commands);
+    add<BuffersCommand>(app, "buffers", commands);
+    add<MomentsCommand>(app, "moments", commands);
+    add<BcdCommand>(app, "bcd", commands);
+    add<SbmcCommand>(app, "sbmc", commands);
+}
+
+}  // namespace vlx
