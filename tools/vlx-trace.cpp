@@ -6,6 +6,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "pilot.h"
+#include "plan.h"
 #include "progress_bar.h"
 #include "render.h"
 #include "scene_loader.h"
@@ -29,6 +31,9 @@ struct TraceCommand {
     int threads = 0;
     bool listCameras = false;
     bool json = false;
+    std::string effects = "auto";
+    std::string explain;
+    std::vector<double> shutter;
     RenderOptions options;
 
     void bind(CLI::App& app) {
@@ -87,6 +92,22 @@ struct TraceCommand {
         app.add_option("--env", environment.image,
                        "Latitude-longitude image of the environment (EXR, HDR, ...); its middle is -z")
             ->excludes(constant);
+        app.add_option("--effects", effects,
+                       "What to simulate: auto, what the scene calls for; all, everything (the general\n"
+                       "tracer, slower); auto,-NAME,... leaves effects out, which biases the image.\n"
+                       "--explain prints their names")
+            ->type_name("auto|all|auto,-NAME")
+            ->capture_default_str();
+        app.add_flag("--explain{text}", explain,
+                     "Print which effects the scene calls for, why, and what part of the time each takes\n"
+                     "(from a short pilot), and end; --explain=json: the same as JSON")
+            ->check(CLI::IsMember({"text", "json"}));
+        app.add_option("--shutter", shutter,
+                       "When the shutter opens and closes, in seconds of the scene's animations\n"
+                       "(default: 0,0.0208; equal times freeze the picture)")
+            ->delimiter(',')
+            ->expected(2)
+            ->type_name("OPEN,CLOSE");
         app.add_option("--threads", threads, "0: all processors. The result does not depend on it")
             ->check(CLI::Range(0, 4096))
             ->capture_default_str();
@@ -98,26 +119,42 @@ struct TraceCommand {
     }
 
     int run() {
-        if (dump.empty() && !listCameras) throw CLI::RequiredError("--output");
-        if (!listCameras) vlx::checkOutputName(dump, {scene});
+        const bool renders = !listCameras && explain.empty();
+        if (dump.empty() && renders) throw CLI::RequiredError("--output");
+        if (renders) vlx::checkOutputName(dump, {scene});
+        std::string broken;
+        const auto request = parseEffects(effects, broken);
+        if (!request) throw CLI::ValidationError("--effects", broken);
+        Shutter exposure;
+        if (shutter.size() == 2) exposure = {shutter[0], shutter[1]};
+        if (!std::isfinite(exposure.open) || !std::isfinite(exposure.close) || exposure.close < exposure.open)
+            throw CLI::ValidationError("--shutter",
+                                       "expected two finite times, the second not before the first");
         for (const float value : environmentConstant)
             if (!std::isfinite(value)) throw CLI::ValidationError("--env-constant", "expected finite values");
         if (environmentConstant.size() == 3)
             environment.constant =
                 Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
         const vlx::ThreadLimit limit(threads);
-        const Scene loaded = loadScene(scene, environment);
+        Scene loaded = loadScene(scene, environment, exposure);
         if (listCameras) return printCameras(loaded);
         options.camera = chosenCamera(loaded);
         setSize(loaded.cameras[options.camera]);
         if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
         options.version = VARIOLUX_VERSION;
-        if (const auto broken = options.validate(loaded)) throw CLI::ValidationError(*broken);
+        if (const auto fault = options.validate(loaded)) throw CLI::ValidationError(*fault);
         for (const std::string& warning : loaded.report.warnings) note("warning: " + warning);
         if (loaded.report.degenerateTriangles > 0)
             note(std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");
 
-        const Accelerator accelerator(loaded);
+        const Plan plan = planEffects(
+            loaded, {options.camera, options.width, options.height, options.path.maxBounces, *request});
+        for (const std::string& warning : plan.warnings) note("warning: " + warning);
+        applyPlan(loaded, plan);
+        options.follow(plan);
+        if (!explain.empty()) return printPlan(loaded, plan);
+
+        const Accelerator accelerator(loaded, options.path.effects);
         RenderReport report;
         {
             vlx::ProgressBar bar("tracing");
@@ -140,6 +177,31 @@ struct TraceCommand {
             const Camera& c = loaded.cameras[i];
             std::cout << i << "  " << c.name << (i == loaded.activeCamera ? "  (active)" : "")
                       << (c.unusable.empty() ? "" : "  unusable: " + c.unusable) << "\n";
+        }
+        return vlx::kDone;
+    }
+
+    int printPlan(const Scene& loaded, const Plan& plan) const {
+        const auto shares = pilotShares(loaded, plan, options);
+        if (explain == "json") {
+            nlohmann::ordered_json list = nlohmann::ordered_json::array();
+            for (const PlannedEffect& e : plan.effects) {
+                nlohmann::ordered_json j{
+                    {"name", nameOf(e.effect)}, {"planned", e.planned}, {"reason", e.reason}};
+                const auto share = shares[static_cast<std::size_t>(e.effect)];
+                if (share) j["share"] = std::round(*share * 1000) / 1000;
+                list.push_back(std::move(j));
+            }
+            std::cout << nlohmann::ordered_json{{"effects", list}, {"lights", loaded.lights.size()}}.dump(2)
+                      << "\n";
+            return vlx::kDone;
+        }
+        std::printf("%-19s%-9s%-7s%s\n", "effect", "planned", "cost", "reason");
+        for (const PlannedEffect& e : plan.effects) {
+            const auto share = shares[static_cast<std::size_t>(e.effect)];
+            const std::string cost = share ? std::to_string(std::lround(*share * 100)) + " %" : "";
+            std::printf("%-19s%-9s%-7s%s\n", std::string(nameOf(e.effect)).c_str(), e.planned ? "yes" : "no",
+                        cost.c_str(), e.reason.c_str());
         }
         return vlx::kDone;
     }
@@ -178,6 +240,7 @@ struct TraceCommand {
                                      {"height", options.height},
                                      {"triangles", loaded.triangleCount()},
                                      {"lights", loaded.lights.size()},
+                                     {"effects", options.plan->simulated()},
                                      {"samples", report.samples},
                                      {"nonFinite", report.nonFinite},
                                      {"degenerateTriangles", loaded.report.degenerateTriangles},

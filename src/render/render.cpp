@@ -7,7 +7,6 @@
 #include <ctime>
 #include <limits>
 
-#include "effects.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/writer.h"
 
@@ -45,6 +44,11 @@ Window clipped(int rx, int ry, const Window& window) {
     return {x0, y0, x1 - x0, y1 - y0};
 }
 
+PlanOptions planOptions(const RenderOptions& options) {
+    return {
+        options.camera, options.width, options.height, options.path.maxBounces, {.all = true, .without = {}}};
+}
+
 DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& options) {
     DumpHeader header;
     header.display = {0, 0, options.width, options.height};
@@ -55,7 +59,13 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     header.renderer = "vlx-trace" + (options.version.empty() ? "" : " " + options.version);
     header.scene = scene.name;
     header.pixelFilter = "box";
-    header.effects = sceneEffects(scene, scene.cameras[options.camera], options.path.maxBounces);
+    const Plan plan = options.plan ? *options.plan : planEffects(scene, planOptions(options));
+    header.effects = plan.simulated();
+    std::string leftOut;
+    for (const PlannedEffect& e : plan.effects)
+        if (plan.leftOut.has(e.effect))
+            leftOut += (leftOut.empty() ? "" : ",") + std::string(nameOf(e.effect));
+    if (!leftOut.empty()) header.extra["variolux:effectsLeftOut"] = leftOut;
     header.seed = static_cast<std::int64_t>(options.seed);
     if (!options.hierarchical) header.samples = options.spp;
     header.worldToCamera = view.worldToCamera();
@@ -67,7 +77,12 @@ class BandTracer {
   public:
     BandTracer(const PathTracer& tracer, const View& view, const RenderOptions& options,
                const DumpHeader& header)
-        : tracer_(tracer), view_(view), options_(options), header_(header) {}
+        : tracer_(tracer),
+          view_(view),
+          options_(options),
+          header_(header),
+          lens_(options.path.effects.has(Effect::DepthOfField)),
+          time_(options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion})) {}
 
     /// Traces the rows of `rows` (the data window's columns).
     SampleBand trace(const Window& rows, const std::function<void(std::int64_t)>& regionDone) {
@@ -95,8 +110,9 @@ class BandTracer {
         const int left = rx * kRegionSize, top = ry * kRegionSize;
         const Shade shade = [&](const CameraSample& s) {
             const PathSampler sampler(s.seed, s.index);
-            const Vec2 lens = view_.hasLens() ? sampler.pair(dimension::kLens) : Vec2{};
-            PathSample sample = tracer_.trace(view_.ray(s.x, s.y, lens), sampler);
+            const Vec2 lens = lens_ ? sampler.pair(dimension::kLens) : Vec2{};
+            const float time = time_ ? sampler.pair(dimension::kTime).x : 0;
+            PathSample sample = tracer_.trace(view_.ray(s.x, s.y, lens, time), sampler);
             if (!isFinite(sample.radiance)) {
                 ++out.nonFinite;
                 sample.radiance = {};
@@ -163,10 +179,20 @@ class BandTracer {
     const View& view_;
     const RenderOptions& options_;
     const DumpHeader& header_;
+    bool lens_;
+    bool time_;
     std::vector<RegionResult> regions_;
 };
 
 }  // namespace
+
+void RenderOptions::follow(const Plan& adopted) {
+    plan = adopted;
+    path.effects = adopted.planned;
+    path.leftOut = {};
+    for (const PlannedEffect& e : adopted.effects)
+        if (adopted.leftOut.has(e.effect) && tracerLeavesOut(e.effect)) path.leftOut.set(e.effect);
+}
 
 std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
     constexpr int kMost = 1 << 20;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "path_tracer.h"
+#include "plan.h"
 #include "region_sampling.h"
 #include "scene.h"
 #include "variolux/base/progress.h"
@@ -25,7 +26,11 @@ struct RenderOptions {
     std::uint64_t seed = 0;
     PathOptions path;
     DumpCompression compression = DumpCompression::Rle;
-    std::string version;  ///< of the program, for the header
+    std::string version;       ///< of the program, for the header
+    std::optional<Plan> plan;  ///< set by follow()
+
+    /// Adopts a plan, which applyPlan is to apply to the scene too.
+    void follow(const Plan& adopted);
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate(const Scene& scene) const;

@@ -9,12 +9,13 @@
 
 namespace vlx::render {
 
-/// Which pair of random numbers is for what. Every use has a pair of its own in every path, whether the path
-/// uses it or not, so that leaving one effect out changes no other effect's numbers.
+/// Which pair of random numbers is for what. Pairs have names, not places in a row: a pair is computed only
+/// for an effect that is simulated, and leaving one effect out changes no other effect's numbers.
 namespace dimension {
 inline constexpr std::uint32_t kPixel = 0;
 inline constexpr std::uint32_t kLens = 1;
-inline constexpr std::uint32_t kOpacity = 2;  ///< seeds the hash of stochastic opacity
+inline constexpr std::uint32_t kOpacity = 2;         ///< seeds the hash of stochastic opacity
+inline constexpr std::uint32_t kTime = 0x80000000u;  ///< x: while the shutter is open
 inline constexpr std::uint32_t kFirstBounce = 3;
 inline constexpr std::uint32_t kPerBounce = 4;
 // Added to the bounce's first pair:

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "effect_counters.h"
+#include "light.h"
+#include "light_tree.h"
+#include "sampling.h"
+#include "scene.h"
+#include "vec.h"
+
+namespace vlx::render {
+
+/// Direct light towards a receiver: a direction, what arrives along it unoccluded, and how likely it was.
+struct LightSample {
+    Vec3 direction;
+    float distance = 0;  ///< of the shadow ray
+    Rgb radiance;        ///< for delta lights: irradiance across the beam
+    float pdf = 0;       ///< per solid angle, choice of light included; for delta lights the latter only
+    bool delta = false;
+};
+
+/// Chooses among the lights of a scene in proportion to their unoccluded irradiance at the receiver (an
+/// estimate, with a floor for all that can reach it); beyond kLocalLights by descending a tree of them.
+/// Refers to the scene, which must outlive it.
+class LightSampler {
+  public:
+    static constexpr std::size_t kLocalLights = 32;
+
+    explicit LightSampler(const Scene& scene);
+
+    /// Estimates at one receiver, made once for its light sample and for what the path then meets by chance.
+    struct Local {
+        Receiver receiver;
+        std::array<float, kLocalLights> weights;
+        float sum = 0;
+        std::uint32_t possible = 0;
+    };
+
+    bool empty() const { return candidates_.empty(); }
+    std::size_t size() const { return candidates_.size(); }
+
+    void prepare(Local& local, const Receiver& receiver) const;
+    LightSample sample(const Local& local, float choice, Vec2 u) const;
+    /// Density with which sample() would have chosen the direction from the receiver to a point of triangle
+    /// `triangle` (of its shape) of mesh light `light`, at `distance`, the light's cosine being `cosLight`.
+    float meshPdf(const Local& local, std::uint32_t light, std::uint32_t triangle, float distance,
+                  float cosLight) const;
+    float spherePdf(const Local& local, std::uint32_t light) const;
+    float environmentPdf(const Local& local, const Vec3& direction) const;
+
+  private:
+    /// A triangle of a mesh light.
+    struct EmitterTriangle {
+        Vec3 corner, edge1, edge2;
+        Vec3 normal;
+        float density = 0;  ///< probability / area
+    };
+    struct Choice {
+        std::size_t light = 0;
+        float probability = 0;
+    };
+    void addTriangles(const Light& light);
+    Choice choose(const Local& local, float u) const;
+    float probability(const Local& local, std::size_t light) const;
+
+    LightSample sampleMesh(const Receiver& receiver, std::size_t light, Vec2 u) const;
+    LightSample sampleSphere(const Receiver& receiver, const Light& light, Vec2 u) const;
+
+    const Scene* scene_;
+    std::vector<LightCandidate> candidates_;
+    std::vector<EmitterTriangle> triangles_;
+    std::vector<std::size_t> firstTriangle_;  ///< of each light, in triangles_
+    LightTree tree_;                          ///< when there are more than kLocalLights
+    std::int64_t environmentLight_ = -1;
+};
+
+}  // namespace vlx::render
