@@ -18,6 +18,24 @@ float distanceTo(const Bounds& b, const Vec3& p) {
     return length({gap(b.low.x, b.high.x, p.x), gap(b.low.y, b.high.y, p.y), gap(b.low.z, b.high.z, p.z)});
 }
 
+/// Whether a plane through the tip of a light's cone has the cone on one side and a box on the other.
+bool outsideCone(const Bounds& b, const Light& light) {
+    // The cone's edge is where cos = -offset / scale.
+    const float edge = std::acos(std::clamp(-light.coneOffset / light.coneScale, -1.f, 1.f)) + 1e-3f;
+    if (edge >= kPi / 2) return false;
+    const Vec3 to = b.centre() - light.position;
+    const Vec3 across = to - light.direction * dot(to, light.direction);
+    const float norm = length(across);
+    const Vec3 aside = norm > 0 ? across / norm : Frame(light.direction).tangent;
+    // Normals on the cone's side: its axis, and the axis tilted away from the box until the plane touches it.
+    for (const Vec3& normal : {light.direction, light.direction * std::sin(edge) - aside * std::cos(edge)}) {
+        const auto c = corners(b);
+        if (std::ranges::all_of(c, [&](const Vec3& p) { return dot(p - light.position, normal) < 0; }))
+            return true;
+    }
+    return false;
+}
+
 }  // namespace
 
 void Bounds::include(const Vec3& p) {
@@ -102,13 +120,7 @@ std::string Reach::idle(const Light& light) const {
         const Bounds& b = bounds_[i];
         if (light.range > 0 && distanceTo(b, light.position) > light.range) continue;
         if (light.coneScale == 0) return "";
-        // The ball about the bounds against the cone's edge, where cos = -offset / scale.
-        const Vec3 to = b.centre() - light.position;
-        const float distance = length(to), radius = b.radius();
-        if (distance <= radius) return "";
-        const float edge = std::acos(std::clamp(-light.coneOffset / light.coneScale, -1.f, 1.f));
-        const float angle = std::acos(std::clamp(dot(to, light.direction) / distance, -1.f, 1.f));
-        if (angle <= edge + std::asin(radius / distance) + 1e-3f) return "";
+        if (!outsideCone(b, light)) return "";
     }
     if (!spreads) return "no surface that a path can meet spreads its light";
     return "it reaches no surface that a path can meet";
