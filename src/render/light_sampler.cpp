@@ -18,7 +18,12 @@ LightSampler::LightSampler(const Scene& scene) : scene_(&scene) {
         if (light.type == LightType::Environment)
             environmentLight_ = static_cast<std::int64_t>(candidates_.size()) - 1;
     }
-    if (candidates_.size() > kLocalLights) tree_ = LightTree(candidates_);
+    if (candidates_.size() > kLocalLights) {
+        tree_ = LightTree(candidates_);
+        return;
+    }
+    quads_.resize((candidates_.size() + 3) / 4);
+    for (std::size_t i = 0; i < candidates_.size(); ++i) quads_[i / 4].set(i % 4, candidates_[i]);
 }
 
 void LightSampler::addTriangles(const Light& light) {
@@ -37,16 +42,16 @@ void LightSampler::addTriangles(const Light& light) {
 void LightSampler::prepare(Local& local, const Receiver& receiver) const {
     local.receiver = receiver;
     if (candidates_.size() > kLocalLights) return;
-    float sum = 0;
-    std::uint32_t possible = 0;
-    for (std::size_t i = 0; i < candidates_.size(); ++i) {
-        const float w = lightImportance(receiver, candidates_[i]);
-        local.weights[i] = w;
-        sum += w;
-        possible += w > 0;
+    LightQuad::Floats sums{};
+    LightQuad::Mask possible{};
+    for (std::size_t i = 0; i < quads_.size(); ++i) {
+        const LightQuad::Floats w = quads_[i].importance(receiver);
+        for (std::size_t lane = 0; lane < 4; ++lane) local.weights[4 * i + lane] = w[lane];
+        sums += w;
+        possible -= w > LightQuad::Floats{};
     }
-    local.sum = sum;
-    local.possible = possible;
+    local.sum = sums[0] + sums[1] + sums[2] + sums[3];
+    local.possible = static_cast<std::uint32_t>(possible[0] + possible[1] + possible[2] + possible[3]);
 }
 
 LightSampler::Choice LightSampler::choose(const Local& local, float u) const {

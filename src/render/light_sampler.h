@@ -36,7 +36,7 @@ class LightSampler {
     /// Estimates at one receiver, made once for its light sample and for what the path then meets by chance.
     struct Local {
         Receiver receiver;
-        std::array<float, kLocalLights> weights;
+        alignas(16) std::array<float, kLocalLights> weights;
         float sum = 0;
         std::uint32_t possible = 0;
     };
@@ -75,6 +75,7 @@ class LightSampler {
     std::vector<LightCandidate> candidates_;
     std::vector<EmitterTriangle> triangles_;
     std::vector<std::size_t> firstTriangle_;  ///< of each light, in triangles_
+    std::vector<LightQuad> quads_;            ///< when there are at most kLocalLights
     LightTree tree_;                          ///< when there are more than kLocalLights
     std::int64_t environmentLight_ = -1;
 };

@@ -71,6 +71,25 @@ inline float lightImportance(const Receiver& receiver, const LightCandidate& lig
     return 0;
 }
 
+/// Four lights side by side, for lightImportance of all of them at once. Spheres and environments are mesh
+/// lights of other bounds.
+struct LightQuad {
+    using Floats [[gnu::vector_size(16)]] = float;
+    using Mask [[gnu::vector_size(16)]] = std::int32_t;
+
+    Floats x{}, y{}, z{};     ///< position
+    Floats dx{}, dy{}, dz{};  ///< direction
+    Floats strength{};        ///< 0: no light
+    Floats coneScale{}, coneOffset{};
+    Floats area{}, nearest{}, most{};  ///< of min(area / max(distance^2, nearest), most)
+    Floats depth{};                    ///< of the bounds below the horizon
+    Mask isPoint{}, isDirectional{};
+
+    void set(std::size_t lane, const LightCandidate& light);
+    /// lightImportance of each, but for rounding.
+    Floats importance(const Receiver& receiver) const;
+};
+
 /// A binary tree over many lights, each node with the bounds and the summed intensity of its lights:
 /// descended by estimated irradiance, so that near lights and strong ones are chosen often and no list is
 /// gone through (Conty, Kulla, "Importance sampling of many lights with adaptive tree splitting", 2018,

@@ -152,19 +152,22 @@ PathSample PathTracer::traceWith(Ray ray, const PathSampler& sampler) const {
         if constexpr (F.rare)
             if (absorbs_ && material.absorbs() && !point.fromBehind) state.beyond = &material;
         lightsSampled = bsdf.hasSmoothLobe() && !lights_.empty() && options_.strategy != Strategy::BsdfOnly;
+        // Four pairs at once where all are wanted, else only those that are.
+        std::array<Vec2, dimension::kPerBounce> pairs;
+        if constexpr (F.reflection) pairs = sampler.bounce(bounce);
+        const auto pair = [&](std::uint32_t use) {
+            return F.reflection ? pairs[use] : sampler.pair(dimension::atBounce(bounce, use));
+        };
         if (lightsSampled) {
             lights_.prepare(local, {point.position, point.shadingNormal, F.glass && material.transmissive()});
-            const Vec2 u = sampler.pair(dimension::atBounce(bounce, dimension::kLight));
-            const float choice =
-                choosesLights_ ? sampler.pair(dimension::atBounce(bounce, dimension::kLightChoice)).x : 0;
-            result.radiance += throughput * directLight<F>(point, frame, bsdf, local, choice, u, state);
+            const float choice = choosesLights_ ? pair(dimension::kLightChoice).x : 0;
+            result.radiance += throughput * directLight<F>(point, frame, bsdf, local, choice,
+                                                           pair(dimension::kLight), state);
         }
 
         Vec2 choice;
-        if (F.reflection || bounce >= kSureBounces)
-            choice = sampler.pair(dimension::atBounce(bounce, dimension::kChoice));
-        const BsdfSample next =
-            bsdf.sample(sampler.pair(dimension::atBounce(bounce, dimension::kDirection)), choice.x);
+        if (F.reflection || bounce >= kSureBounces) choice = pair(dimension::kChoice);
+        const BsdfSample next = bsdf.sample(pair(dimension::kDirection), choice.x);
         if (isBlack(next.weight)) break;
         const Vec3 direction = normalized(frame.toWorld(next.wi));
         if (!consistent<F>(point, direction, next.wi.z)) break;
