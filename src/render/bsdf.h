@@ -213,9 +213,13 @@ BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromIns
     }
     if constexpr (F.rare)
         if (!s.leftOut.none()) leaveOut(s.leftOut);
-    float total = 0;
-    for (const float p : probability_) total += p;
-    for (float& p : probability_) p = total > 0 ? p / total : 0;
+    if constexpr (!F.reflection) {
+        if (probability_[kDiffuse] > 0) probability_[kDiffuse] = 1;  // alone
+    } else {
+        float total = 0;
+        for (const float p : probability_) total += p;
+        for (float& p : probability_) p = total > 0 ? p / total : 0;
+    }
     onlyDelta_ = (probability_[kCoat] == 0 || coatSmooth_) && (probability_[kReflection] == 0 || smooth_) &&
                  probability_[kDiffuse] == 0 && (probability_[kGlass] == 0 || glassSmooth_) &&
                  probability_[kSheen] == 0;

@@ -8,7 +8,8 @@ constexpr float kReach = 1 - 1e-4f;
 
 }  // namespace
 
-LightSampler::LightSampler(const Scene& scene) : scene_(&scene) {
+LightSampler::LightSampler(const Scene& scene, bool measures)
+    : scene_(&scene), alone_(!measures && scene.lights.size() == 1) {
     for (const Light& light : scene.lights) {
         const float strength = maxComponent(light.intensity);
         candidates_.push_back({light.position, light.radius, light.direction, strength, light.area,
@@ -39,8 +40,8 @@ void LightSampler::addTriangles(const Light& light) {
     }
 }
 
-void LightSampler::prepare(Local& local, const Receiver& receiver) const {
-    local.receiver = receiver;
+void LightSampler::estimate(Local& local) const {
+    const Receiver& receiver = local.receiver;
     if (candidates_.size() > kLocalLights) return;
     LightQuad::Floats sums{};
     LightQuad::Mask possible{};
@@ -65,7 +66,7 @@ LightSampler::Choice LightSampler::choose(const Local& local, float u) const {
     Choice last;
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
         if (local.weights[i] == 0) continue;
-        last = {i, even + (1 - kEvenPart) * local.weights[i] / local.sum};
+        last = {i, even + (1 - kEvenPart) * (local.weights[i] / local.sum)};
         if (rest < last.probability) break;
         rest -= last.probability;
     }
@@ -76,7 +77,7 @@ float LightSampler::probability(const Local& local, std::size_t light) const {
     if (candidates_.size() > kLocalLights) return tree_.probability(candidates_, local.receiver, light);
     const float own = local.weights[light];
     if (own == 0) return 0;
-    return kEvenPart / static_cast<float>(local.possible) + (1 - kEvenPart) * own / local.sum;
+    return kEvenPart / static_cast<float>(local.possible) + (1 - kEvenPart) * (own / local.sum);
 }
 
 LightSample LightSampler::sampleMesh(const Receiver& receiver, std::size_t index, Vec2 u) const {
@@ -125,7 +126,7 @@ LightSample LightSampler::sampleSphere(const Receiver& receiver, const Light& li
 
 LightSample LightSampler::sample(const Local& local, float choice, Vec2 u) const {
     const Receiver& receiver = local.receiver;
-    const Choice chosen = choose(local, choice);
+    const Choice chosen = alone_ ? Choice{0, 1} : choose(local, choice);
     if (chosen.probability == 0) return {};
     const Light& light = scene_->lights[chosen.light];
     LightSample s;

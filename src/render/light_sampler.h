@@ -31,7 +31,8 @@ class LightSampler {
   public:
     static constexpr std::size_t kLocalLights = 32;
 
-    explicit LightSampler(const Scene& scene);
+    /// `measures`: estimates are made even where there is no choice, for a single light.
+    explicit LightSampler(const Scene& scene, bool measures = true);
 
     /// Estimates at one receiver, made once for its light sample and for what the path then meets by chance.
     struct Local {
@@ -44,7 +45,15 @@ class LightSampler {
     bool empty() const { return candidates_.empty(); }
     std::size_t size() const { return candidates_.size(); }
 
-    void prepare(Local& local, const Receiver& receiver) const;
+    void prepare(Local& local, const Receiver& receiver) const {
+        local.receiver = receiver;
+        if (!alone_) {
+            estimate(local);
+            return;
+        }
+        local.weights[0] = local.sum = 1;
+        local.possible = 1;
+    }
     LightSample sample(const Local& local, float choice, Vec2 u) const;
     /// Density with which sample() would have chosen the direction from the receiver to a point of triangle
     /// `triangle` (of its shape) of mesh light `light`, at `distance`, the light's cosine being `cosLight`.
@@ -64,6 +73,7 @@ class LightSampler {
         std::size_t light = 0;
         float probability = 0;
     };
+    void estimate(Local& local) const;
     void addTriangles(const Light& light);
     Choice choose(const Local& local, float u) const;
     float probability(const Local& local, std::size_t light) const;
@@ -78,6 +88,7 @@ class LightSampler {
     std::vector<LightQuad> quads_;            ///< when there are at most kLocalLights
     LightTree tree_;                          ///< when there are more than kLocalLights
     std::int64_t environmentLight_ = -1;
+    bool alone_;  ///< a single light, taken without estimates
 };
 
 }  // namespace vlx::render

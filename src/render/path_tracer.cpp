@@ -30,7 +30,7 @@ PathTracer::PathTracer(const Scene& scene, const Accelerator& accelerator, const
     : scene_(scene),
       accelerator_(accelerator),
       options_(options),
-      lights_(scene),
+      lights_(scene, options.effects == EffectSet::all()),
       features_(kEveryFeature),
       kernel_(&PathTracer::traceWith<kEveryFeature>),
       hashesOpacity_(options.effects.has(Effect::Alpha)),

@@ -1,8 +1,8 @@
 #include "region_sampling.h"
 
 #include <array>
+#include <bit>
 #include <cassert>
-#include <limits>
 
 #include "sampling.h"
 
@@ -12,7 +12,8 @@ namespace {
 /// The float nearest to a raster position from below: rounding must not move a sample into the next cell.
 float rasterFloor(double position) {
     const auto f = static_cast<float>(position);
-    return f > position ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
+    // Positions are not negative: the float before a positive one has the bits before its bits.
+    return f > position ? std::bit_cast<float>(std::bit_cast<std::uint32_t>(f) - 1) : f;
 }
 
 std::uint64_t pixelSeed(std::uint64_t seed, int column, int row, int replicate) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
@@ -162,5 +163,14 @@ class Distribution {
   private:
     std::vector<float> cumulative_;  ///< size() + 1 values from 0 to 1
 };
+
+inline Distribution::Sample Distribution::sample(float u) const {
+    // The last entry whose lower bound is <= u: entries of probability 0 are never taken, because the next
+    // one has the same lower bound.
+    const auto above = std::upper_bound(cumulative_.begin(), cumulative_.end() - 1, u);
+    const auto index = static_cast<std::size_t>(above - cumulative_.begin()) - 1;
+    const float p = probability(index);
+    return {index, p, std::min((u - cumulative_[index]) / p, 0x1.fffffep-1f)};
+}
 
 }  // namespace vlx::render

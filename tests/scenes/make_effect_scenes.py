@@ -15,7 +15,7 @@ from make_scenes import Scene, floor, lamp  # noqa: E402
 
 
 def matte(scene, colour):
-    return scene.material(colour, specular=0)
+    return scene.material(colour, specular=0, double_sided=True)
 
 
 def extend(scene, material, name, values):
