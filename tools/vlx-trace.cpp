@@ -1,5 +1,7 @@
 // vlx-trace: traces a glTF scene into a dump of samples.
 
+#include <malloc.h>
+
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -34,6 +36,10 @@ struct TraceCommand {
     std::string effects = "auto";
     std::string explain;
     std::vector<double> shutter;
+    double timeLimit = 0;
+    double targetError = 0;
+    std::string earlierPath;
+    std::string mapPath;
     RenderOptions options;
 
     void bind(CLI::App& app) {
@@ -73,6 +79,31 @@ struct TraceCommand {
             ->check(CLI::NonNegativeNumber)
             ->needs(hierarchical)
             ->capture_default_str();
+        auto* time = app.add_option("--time", timeLimit,
+                                    "Take as many samples a pixel as this many seconds of tracing allow,\n"
+                                    "judged by a short pilot")
+                         ->check(CLI::PositiveNumber)
+                         ->excludes(spp)
+                         ->excludes(hierarchical)
+                         ->type_name("SECONDS");
+        app.add_option("--target-error", targetError,
+                       "Take as many samples a pixel as bring the relMSE of the plain average down to\n"
+                       "this, judged by a short pilot (before reconstruction)")
+            ->check(CLI::PositiveNumber)
+            ->excludes(spp)
+            ->excludes(hierarchical)
+            ->excludes(time)
+            ->type_name("RELMSE");
+        app.add_option("--append", earlierPath,
+                       "A dump of the same view: its samples are kept, --spp more are added to\n"
+                       "them, and both are written to the output")
+            ->excludes(hierarchical)
+            ->type_name("DUMP");
+        app.add_option("--sample-map", mapPath,
+                       "Where samples are wanted: an image with a channel sampling.density (or Y),\n"
+                       ">= 0, relative to its mean. --spp is then the mean over the picture")
+            ->excludes(hierarchical)
+            ->type_name("MAP");
         app.add_option("--replicates", options.replicates,
                        "Divide the samples of each pixel into this many independent randomisations\n"
                        "(written as sample.replicate)")
@@ -121,7 +152,7 @@ struct TraceCommand {
     int run() {
         const bool renders = !listCameras && explain.empty();
         if (dump.empty() && renders) throw CLI::RequiredError("--output");
-        if (renders) vlx::checkOutputName(dump, {scene});
+        if (renders) vlx::checkOutputName(dump, {scene, earlierPath, mapPath});
         std::string broken;
         const auto request = parseEffects(effects, broken);
         if (!request) throw CLI::ValidationError("--effects", broken);
@@ -139,6 +170,8 @@ struct TraceCommand {
         Scene loaded = loadScene(scene, environment, exposure);
         if (listCameras) return printCameras(loaded);
         options.camera = chosenCamera(loaded);
+        std::optional<EarlierDump> earlier;
+        if (!earlierPath.empty()) takeSizeOf(earlier.emplace(earlierPath));
         setSize(loaded.cameras[options.camera]);
         if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
         options.version = VARIOLUX_VERSION;
@@ -147,6 +180,11 @@ struct TraceCommand {
         if (loaded.report.degenerateTriangles > 0)
             note(std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");
 
+        std::optional<SampleMap> map;
+        if (!mapPath.empty()) {
+            const vlx::Window whole{0, 0, options.width, options.height};
+            options.map = &map.emplace(mapPath, options.crop.value_or(whole));
+        }
         const Plan plan = planEffects(
             loaded, {options.camera, options.width, options.height, options.path.maxBounces, *request});
         for (const std::string& warning : plan.warnings) note("warning: " + warning);
@@ -155,6 +193,7 @@ struct TraceCommand {
         if (!explain.empty()) return printPlan(loaded, plan);
 
         const Accelerator accelerator(loaded, options.path.effects);
+        if (timeLimit > 0 || targetError > 0) chooseSamples(loaded, accelerator);
         RenderReport report;
         {
             vlx::ProgressBar bar("tracing");
@@ -218,6 +257,35 @@ struct TraceCommand {
         throw vlx::Error(scene, "has no camera '" + camera + "'; it has " + names);
     }
 
+    /// The picture of the dump that is added to, where the command line names none.
+    void takeSizeOf(const EarlierDump& earlier) {
+        options.earlier = &earlier;
+        const vlx::DumpHeader& header = earlier.header();
+        if (width == 0 && height == 0) {
+            width = header.display.width;
+            height = header.display.height;
+        }
+        if (crop.empty() && header.data != header.display)
+            crop = {header.data.x, header.data.y, header.data.width, header.data.height};
+    }
+
+    /// --time and --target-error.
+    void chooseSamples(const Scene& loaded, const Accelerator& accelerator) {
+        const PilotMeasure pilot =
+            pilotMeasure(loaded, accelerator, options, std::min(1.0, 0.05 * std::max(timeLimit, 1.0)));
+        const vlx::Window whole{0, 0, options.width, options.height};
+        const auto pixels = static_cast<double>(options.crop.value_or(whole).pixels());
+        const double wanted =
+            timeLimit > 0 ? std::floor((timeLimit - pilot.seconds) / (pixels * pilot.secondsPerSample))
+                          : std::ceil(pilot.relativeVariance / targetError);
+        const auto replicates = static_cast<double>(options.replicates);
+        const double most = std::floor((1 << 24) / replicates) * replicates;
+        const double rounded =
+            replicates * (timeLimit > 0 ? std::floor(wanted / replicates) : std::ceil(wanted / replicates));
+        options.spp = static_cast<int>(std::clamp(rounded, replicates, most));
+        note(std::to_string(options.spp) + " samples a pixel");
+    }
+
     void setSize(const Camera& chosen) {
         const double aspect = chosen.aspect > 0 ? static_cast<double>(chosen.aspect) : 1.0;
         const auto rounded = [](double v) { return std::max(1, static_cast<int>(std::lround(v))); };
@@ -250,6 +318,7 @@ struct TraceCommand {
                                      {"traceCpuSeconds", report.traceCpuSeconds},
                                      {"writeCpuSeconds", report.writeCpuSeconds},
                                      {"warnings", loaded.report.warnings}};
+            if (!options.hierarchical) j["samplesPerPixel"] = options.spp;
             if (options.hierarchical) j["refinedCells"] = report.refinedCells;
             std::cout << j.dump(2) << "\n";
         }
@@ -264,6 +333,11 @@ struct TraceCommand {
 }  // namespace
 
 int main(int argc, char** argv) {
+#ifdef __GLIBC__
+    // Bands of samples come and go all the time: their memory is kept, not given back and cleared anew.
+    mallopt(M_MMAP_THRESHOLD, 1 << 28);
+    mallopt(M_TRIM_THRESHOLD, 1 << 28);
+#endif
     CLI::App app("Trace a glTF scene by path tracing into a dump of samples.", "vlx-trace");
     TraceCommand command;
     command.bind(app);

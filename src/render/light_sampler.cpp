@@ -1,20 +1,13 @@
 #include "light_sampler.h"
 
 namespace vlx::render {
-namespace {
-
-/// Shadow rays end a little before the light.
-constexpr float kReach = 1 - 1e-4f;
-
-}  // namespace
-
 LightSampler::LightSampler(const Scene& scene, bool measures)
-    : scene_(&scene), alone_(!measures && scene.lights.size() == 1) {
+    : scene_(&scene), measures_(measures), alone_(!measures && scene.lights.size() == 1) {
     for (const Light& light : scene.lights) {
         const float strength = maxComponent(light.intensity);
         candidates_.push_back({light.position, light.radius, light.direction, strength, light.area,
                                light.coneScale, light.coneOffset, light.type});
-        firstTriangle_.push_back(triangles_.size());
+        meshes_.emplace_back();
         if (light.type == LightType::Mesh) addTriangles(light);
         if (light.type == LightType::Environment)
             environmentLight_ = static_cast<std::int64_t>(candidates_.size()) - 1;
@@ -29,6 +22,10 @@ LightSampler::LightSampler(const Scene& scene, bool measures)
 
 void LightSampler::addTriangles(const Light& light) {
     const Shape& shape = scene_->shapes[light.shape];
+    const Material& material = scene_->materials[shape.material];
+    const bool plain = !measures_ && !material.emissionTexture && material.clearcoat == 0 &&
+                       material.alphaMode == AlphaMode::Opaque;
+    meshes_.back() = {&light, triangles_.size(), material.visibleFromBehind(), plain, material.emission};
     for (std::uint32_t i = 0; i < shape.triangles; ++i) {
         const auto& corner = scene_->triangles[shape.firstTriangle + i];
         const Vec3& p = scene_->vertices[corner[0]].position;
@@ -80,30 +77,6 @@ float LightSampler::probability(const Local& local, std::size_t light) const {
     return kEvenPart / static_cast<float>(local.possible) + (1 - kEvenPart) * (own / local.sum);
 }
 
-LightSample LightSampler::sampleMesh(const Receiver& receiver, std::size_t index, Vec2 u) const {
-    countEffect(Effect::EmissiveMeshes);
-    // u.x chooses the triangle, and its remainder the place on it.
-    const Light& light = scene_->lights[index];
-    const Distribution::Sample chosen = light.triangles.sample(u.x);
-    const Vec2 b = uniformTriangle({chosen.remapped, u.y});
-    const EmitterTriangle& t = triangles_[firstTriangle_[index] + chosen.index];
-    const Vec3 to = t.corner + t.edge1 * b.x + t.edge2 * b.y - receiver.position;
-    const float d2 = lengthSquared(to);
-    if (!(d2 > 0)) return {};
-    LightSample s;
-    s.distance = std::sqrt(d2);
-    s.direction = to / s.distance;
-    const float cosLight = -dot(t.normal, s.direction);
-    const Shape& shape = scene_->shapes[light.shape];
-    if (cosLight == 0 || (cosLight < 0 && !scene_->materials[shape.material].visibleFromBehind())) return {};
-    s.pdf = t.density * d2 / std::abs(cosLight);
-    const auto triangle = shape.firstTriangle + static_cast<std::uint32_t>(chosen.index);
-    s.radiance = emittedRadiance(*scene_, shape, triangle, b.x, b.y, std::abs(cosLight)) *
-                 opacityAt(*scene_, shape, triangle, b.x, b.y);
-    s.distance *= kReach;
-    return s;
-}
-
 LightSample LightSampler::sampleSphere(const Receiver& receiver, const Light& light, Vec2 u) const {
     countEffect(Effect::SphereLights);
     const Vec3 to = light.position - receiver.position;
@@ -124,7 +97,7 @@ LightSample LightSampler::sampleSphere(const Receiver& receiver, const Light& li
     return s;
 }
 
-LightSample LightSampler::sample(const Local& local, float choice, Vec2 u) const {
+LightSample LightSampler::sampleAny(const Local& local, float choice, Vec2 u) const {
     const Receiver& receiver = local.receiver;
     const Choice chosen = alone_ ? Choice{0, 1} : choose(local, choice);
     if (chosen.probability == 0) return {};
@@ -168,7 +141,7 @@ LightSample LightSampler::sample(const Local& local, float choice, Vec2 u) const
 
 float LightSampler::meshPdf(const Local& local, std::uint32_t light, std::uint32_t triangle, float distance,
                             float cosLight) const {
-    return probability(local, light) * triangles_[firstTriangle_[light] + triangle].density *
+    return probability(local, light) * triangles_[meshes_[light].firstTriangle + triangle].density *
            square(distance) / std::max(std::abs(cosLight), 1e-12f);
 }
 

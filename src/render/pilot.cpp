@@ -1,10 +1,15 @@
 #include "pilot.h"
 
+#include <chrono>
+#include <cmath>
 #include <ctime>
 #include <limits>
 #include <memory>
+#include <vector>
 
 #include "camera.h"
+#include "variolux/base/hash.h"
+#include "variolux/base/parallel.h"
 
 namespace vlx::render {
 namespace {
@@ -104,6 +109,58 @@ std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, cons
         shares[static_cast<std::size_t>(e.effect)] = with > 0 ? std::max(0.0, 1 - less / with) : 0;
     }
     return shares;
+}
+
+PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, const RenderOptions& options,
+                          double atLeast) {
+    using Clock = std::chrono::steady_clock;
+    constexpr int kPixels = 1024, kPerPixel = 16, kMostRounds = 64;
+    const View view(scene.cameras[options.camera], options.width, options.height);
+    const PathTracer tracer(scene, accelerator, options.path);
+    const bool lens = options.path.effects.has(Effect::DepthOfField);
+    const bool moves = options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion});
+    const Window window = options.crop.value_or(Window{0, 0, options.width, options.height});
+    PilotMeasure measure;
+    double variance = 0;
+    int rounds = 0;
+    const auto start = Clock::now();
+    do {
+        std::vector<double> errors(kPixels);
+        parallelFor(0, kPixels, [&](std::int64_t i) {
+            // Points of the plane's sequence, mixed, so that a round's pixels are all over the picture.
+            const SobolPoint p = scrambledSobolPoint(static_cast<std::uint32_t>(rounds * kPixels + i),
+                                                     SobolSeeds::from(0x70696cu));
+            const float x =
+                static_cast<float>(window.x) + std::floor(unitFloat(p.x) * static_cast<float>(window.width));
+            const float y =
+                static_cast<float>(window.y) + std::floor(unitFloat(p.y) * static_cast<float>(window.height));
+            std::array<double, 3> sum{}, squares{};
+            for (std::uint32_t s = 0; s < kPerPixel; ++s) {
+                const PathSampler sampler(hashOf(options.seed, 0x70696cu, rounds, i), s);
+                const Vec2 at = sampler.pair(dimension::kPixel);
+                const Vec2 u = lens ? sampler.pair(dimension::kLens) : Vec2{};
+                const float time = moves ? sampler.pair(dimension::kTime).x : 0;
+                const Rgb v = tracer.trace(view.ray(x + at.x, y + at.y, u, time), sampler).radiance;
+                const std::array<double, 3> rgb{v.x, v.y, v.z};
+                for (std::size_t c = 0; c < 3; ++c) {
+                    sum[c] += rgb[c];
+                    squares[c] += rgb[c] * rgb[c];
+                }
+            }
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double mean = sum[c] / kPerPixel;
+                const double v =
+                    std::max(0.0, squares[c] / kPerPixel - mean * mean) * kPerPixel / (kPerPixel - 1);
+                errors[static_cast<std::size_t>(i)] += v / (mean * mean + 0.01) / 3;
+            }
+        });
+        for (const double e : errors) variance += e / kPixels;
+        ++rounds;
+        measure.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    } while (measure.seconds < atLeast && rounds < kMostRounds);
+    measure.secondsPerSample = measure.seconds / (static_cast<double>(rounds) * kPixels * kPerPixel);
+    measure.relativeVariance = variance / rounds;
+    return measure;
 }
 
 }  // namespace vlx::render

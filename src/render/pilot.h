@@ -15,4 +15,15 @@ namespace vlx::render {
 std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, const Plan& plan,
                                                         const RenderOptions& options);
 
+/// What a few samples, spread over the picture, say of all.
+struct PilotMeasure {
+    double seconds = 0;           ///< of the pilot itself, wall time
+    double secondsPerSample = 0;  ///< wall time, on as many threads as rendering takes
+    double relativeVariance = 0;  ///< mean over pixels and channels of a sample's variance / (mean^2 + 0.01)
+};
+
+/// Traces pixels of a grid over the picture, 16 samples each, until that has taken `atLeast` seconds.
+PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, const RenderOptions& options,
+                          double atLeast);
+
 }  // namespace vlx::render

@@ -173,26 +173,41 @@ class RegionRefiner {
 
 }  // namespace
 
+namespace {
+
+/// The first `count` points of a pixel's randomisation.
+void samplePixel(int column, int row, int count, std::uint32_t replicate, std::uint64_t seed,
+                 const Shade& shade) {
+    CameraSample s;
+    s.column = column;
+    s.row = row;
+    s.replicate = replicate;
+    s.seed = pixelSeed(seed, column, row, static_cast<int>(replicate));
+    for (int i = 0; i < count; ++i) {
+        s.index = static_cast<std::uint32_t>(i);
+        const Vec2 u = PathSampler(s.seed, s.index).pair(dimension::kPixel);
+        s.x = rasterFloor(static_cast<double>(column) + u.x);
+        s.y = rasterFloor(static_cast<double>(row) + u.y);
+        shade(s);
+    }
+}
+
+}  // namespace
+
 void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_t seed, const Shade& shade) {
     assert(replicates > 0 && spp % replicates == 0);
-    for (int row = window.y; row < window.y + window.height; ++row) {
-        for (int column = window.x; column < window.x + window.width; ++column) {
-            for (int replicate = 0; replicate < replicates; ++replicate) {
-                CameraSample s;
-                s.column = column;
-                s.row = row;
-                s.replicate = static_cast<std::uint32_t>(replicate);
-                s.seed = pixelSeed(seed, column, row, replicate);
-                for (int i = 0; i < spp / replicates; ++i) {
-                    s.index = static_cast<std::uint32_t>(i);
-                    const Vec2 u = PathSampler(s.seed, s.index).pair(dimension::kPixel);
-                    s.x = rasterFloor(static_cast<double>(column) + u.x);
-                    s.y = rasterFloor(static_cast<double>(row) + u.y);
-                    shade(s);
-                }
-            }
-        }
-    }
+    for (int row = window.y; row < window.y + window.height; ++row)
+        for (int column = window.x; column < window.x + window.width; ++column)
+            for (int replicate = 0; replicate < replicates; ++replicate)
+                samplePixel(column, row, spp / replicates, static_cast<std::uint32_t>(replicate), seed,
+                            shade);
+}
+
+void sampleCounts(const Window& window, const std::function<int(int, int)>& countAt, std::uint32_t replicate,
+                  std::uint64_t seed, const Shade& shade) {
+    for (int row = window.y; row < window.y + window.height; ++row)
+        for (int column = window.x; column < window.x + window.width; ++column)
+            samplePixel(column, row, countAt(column, row), replicate, seed, shade);
 }
 
 std::vector<int> sampleHierarchically(const Window& window, int regionX, int regionY,

@@ -7,6 +7,7 @@
 #include <ctime>
 #include <limits>
 
+#include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/writer.h"
 
@@ -54,7 +55,9 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     header.display = {0, 0, options.width, options.height};
     header.data = options.crop.value_or(header.display);
     header.channels = standardChannels();
-    if (options.replicates == 1) header.channels.pop_back();  // sample.replicate
+    const bool replicates =
+        options.replicates > 1 || (options.earlier != nullptr && options.earlier->hasReplicates());
+    if (!replicates) header.channels.pop_back();  // sample.replicate
     header.compression = options.compression;
     header.renderer = "vlx-trace" + (options.version.empty() ? "" : " " + options.version);
     header.scene = scene.name;
@@ -68,6 +71,11 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     if (!leftOut.empty()) header.extra["variolux:effectsLeftOut"] = leftOut;
     header.seed = static_cast<std::int64_t>(options.seed);
     if (!options.hierarchical) header.samples = options.spp;
+    if (options.earlier != nullptr) {
+        const double mean =
+            static_cast<double>(options.earlier->samples()) / static_cast<double>(header.data.pixels());
+        header.samples = mean + options.spp;
+    }
     header.worldToCamera = view.worldToCamera();
     header.worldToNDC = view.worldToNdc();
     return header;
@@ -82,7 +90,14 @@ class BandTracer {
           options_(options),
           header_(header),
           lens_(options.path.effects.has(Effect::DepthOfField)),
-          time_(options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion})) {}
+          time_(options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion})),
+          seed_(options.seed),
+          firstReplicate_(0) {
+        if (options.earlier == nullptr) return;
+        // Numbers of their own: the earlier samples may have used this seed.
+        seed_ = hashOf(options.seed, options.earlier->samples(), 0x617070u);
+        firstReplicate_ = options.earlier->freeReplicate();
+    }
 
     /// Traces the rows of `rows` (the data window's columns).
     SampleBand trace(const Window& rows, const std::function<void(std::int64_t)>& regionDone) {
@@ -124,6 +139,14 @@ class BandTracer {
         };
         if (options_.hierarchical) {
             out.refined = sampleHierarchically(out.window, rx, ry, options_.refinement, options_.seed, shade);
+        } else if (options_.map != nullptr) {
+            const auto countAt = [&](int x, int y) {
+                return options_.map->samplesAt(x, y, options_.spp, seed_);
+            };
+            sampleCounts(out.window, countAt, firstReplicate_, seed_, shade);
+        } else if (options_.earlier != nullptr) {
+            sampleCounts(
+                out.window, [&](int, int) { return options_.spp; }, firstReplicate_, seed_, shade);
         } else {
             sampleUniformly(out.window, options_.spp, options_.replicates, options_.seed, shade);
         }
@@ -159,6 +182,8 @@ class BandTracer {
             std::array<std::uint64_t, kRegionSize * kRegionSize> next{};
             forPixels(region,
                       [&](std::size_t local, std::size_t pixel) { next[local] = band.offsets[pixel]; });
+            std::array<float*, 14> channel{};
+            for (std::size_t c = 0; c < band.values.size(); ++c) channel[c] = band.values[c].data();
             for (const Record& r : region.records) {
                 const PathSample& s = r.sample;
                 const std::array<float, 14> values = {s.radiance.x, s.radiance.y,
@@ -169,7 +194,7 @@ class BandTracer {
                                                       s.normal.x,   s.normal.y,
                                                       s.normal.z,   static_cast<float>(r.replicate)};
                 const std::uint64_t at = next[static_cast<std::size_t>(r.pixel)]++;
-                for (std::size_t c = 0; c < band.values.size(); ++c) band.values[c][at] = values[c];
+                for (std::size_t c = 0; c < band.values.size(); ++c) channel[c][at] = values[c];
             }
         });
         return band;
@@ -181,6 +206,8 @@ class BandTracer {
     const DumpHeader& header_;
     bool lens_;
     bool time_;
+    std::uint64_t seed_;
+    std::uint32_t firstReplicate_;
     std::vector<RegionResult> regions_;
 };
 
@@ -215,6 +242,10 @@ std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
         return "seed must be less than 2^63";
     if (replicates < 1 || spp % replicates != 0) return "replicates must divide spp";
     if (hierarchical && replicates != 1) return "hierarchical sampling has one randomisation, not replicates";
+    if (hierarchical && (map != nullptr || earlier != nullptr))
+        return "hierarchical sampling neither follows a sample map nor adds to a dump";
+    if (replicates != 1 && (map != nullptr || earlier != nullptr))
+        return "samples of a map, or added to a dump, are one randomisation, not replicates";
     if (!(refinement.tolerance >= 0)) return "tolerance must be 0 or more";
     if (refinement.levels < 1 || refinement.levels > 5) return "levels must be 1 to 5";
     if (path.maxBounces < 0 || path.maxBounces > 1 << 16) return "max bounces must be 0 to 65536";
@@ -228,11 +259,14 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     const PathTracer tracer(scene, accelerator, options.path);
     const DumpHeader header = headerOf(scene, view, options);
     const Window& window = header.data;
+    if (options.earlier != nullptr) options.earlier->checkSameView(header);
     DumpWriter writer(path, header);
     BandTracer bands(tracer, view, options, header);
 
-    const std::int64_t mostSpp =
-        options.hierarchical ? std::int64_t{1} << (2 * (options.refinement.levels - 1)) : options.spp;
+    const std::int64_t mostSpp = options.hierarchical
+                                     ? std::int64_t{1} << (2 * (options.refinement.levels - 1))
+                                 : options.map != nullptr ? options.map->most(options.spp)
+                                                          : options.spp;
     int bandRows = kBandRows;
     while (bandRows > kRegionSize && bandRows * mostSpp * window.width > kBandSamples)
         bandRows -= kRegionSize;
@@ -261,10 +295,12 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
             for (std::size_t i = 0; i < region.refined.size(); ++i)
                 report.refinedCells[i] += static_cast<std::uint64_t>(region.refined[i]);
         }
-        writer.write(std::move(band));
+        writer.write(options.earlier != nullptr ? options.earlier->before(band) : std::move(band));
         y = end;
     }
-    writer.close(report.traceSeconds);
+    const double before =
+        options.earlier != nullptr ? options.earlier->header().renderSeconds.value_or(0) : 0;
+    writer.close(before + report.traceSeconds);
     report.writeCpuSeconds = writer.cpuSeconds();
     report.traceCpuSeconds =
         static_cast<double>(std::clock() - cpuStart) / CLOCKS_PER_SEC - report.writeCpuSeconds;

@@ -4,9 +4,11 @@
 #include <optional>
 #include <string>
 
+#include "append.h"
 #include "path_tracer.h"
 #include "plan.h"
 #include "region_sampling.h"
+#include "sample_map.h"
 #include "scene.h"
 #include "variolux/base/progress.h"
 #include "variolux/base/window.h"
@@ -24,6 +26,8 @@ struct RenderOptions {
     bool hierarchical = false;   ///< METHOD.md, section 3: 1 to 256 samples a pixel as needed
     HierarchicalOptions refinement;
     std::uint64_t seed = 0;
+    const SampleMap* map = nullptr;        ///< where the samples are wanted; spp is then their mean
+    const EarlierDump* earlier = nullptr;  ///< whose samples are to be kept, before the new ones
     PathOptions path;
     DumpCompression compression = DumpCompression::Rle;
     std::string version;       ///< of the program, for the header
