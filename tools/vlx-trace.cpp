@@ -271,13 +271,15 @@ struct TraceCommand {
 
     /// --time and --target-error.
     void chooseSamples(const Scene& loaded, const Accelerator& accelerator) {
+        constexpr double kBeside = 1.2;  // gathering and writing the samples takes time too
         const PilotMeasure pilot =
             pilotMeasure(loaded, accelerator, options, std::min(1.0, 0.05 * std::max(timeLimit, 1.0)));
         const vlx::Window whole{0, 0, options.width, options.height};
         const auto pixels = static_cast<double>(options.crop.value_or(whole).pixels());
         const double wanted =
-            timeLimit > 0 ? std::floor((timeLimit - pilot.seconds) / (pixels * pilot.secondsPerSample))
-                          : std::ceil(pilot.relativeVariance / targetError);
+            timeLimit > 0
+                ? std::floor((timeLimit - pilot.seconds) / (kBeside * pixels * pilot.secondsPerSample))
+                : std::ceil(pilot.relativeVariance / targetError);
         const auto replicates = static_cast<double>(options.replicates);
         const double most = std::floor((1 << 24) / replicates) * replicates;
         const double rounded =

@@ -18,7 +18,7 @@ std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, cons
 /// What a few samples, spread over the picture, say of all.
 struct PilotMeasure {
     double seconds = 0;           ///< of the pilot itself, wall time
-    double secondsPerSample = 0;  ///< wall time, on as many threads as rendering takes
+    double secondsPerSample = 0;  ///< wall time, on all threads; writing not included
     double relativeVariance = 0;  ///< mean over pixels and channels of a sample's variance / (mean^2 + 0.01)
 };
 

@@ -111,8 +111,12 @@ inline Vec2 toDisk(Vec2 u) {
     if (a == 0 && b == 0) return {0, 0};
     const bool wide = std::abs(a) > std::abs(b);
     const float r = wide ? a : b;
-    const float phi = wide ? (kPi / 4) * (b / a) : (kPi / 2) - (kPi / 4) * (a / b);
-    return {r * std::cos(phi), r * std::sin(phi)};
+    // Sine and cosine of an angle of at most pi / 4, from the nearer axis: Taylor's series is exact in float.
+    const float x = (kPi / 4) * (wide ? b / a : a / b), x2 = x * x;
+    const float sine =
+        x * (1 + x2 * (-1.f / 6 + x2 * (1.f / 120 + x2 * (-1.f / 5040 + x2 * (1.f / 362880)))));
+    const float cosine = 1 + x2 * (-0.5f + x2 * (1.f / 24 + x2 * (-1.f / 720 + x2 * (1.f / 40320))));
+    return wide ? Vec2{r * cosine, r * sine} : Vec2{r * sine, r * cosine};
 }
 
 /// Cosine-weighted direction about +z; density cos / pi.
