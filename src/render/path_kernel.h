@@ -152,22 +152,17 @@ PathSample PathTracer::traceWith(Ray ray, const PathSampler& sampler) const {
         if constexpr (F.rare)
             if (absorbs_ && material.absorbs() && !point.fromBehind) state.beyond = &material;
         lightsSampled = bsdf.hasSmoothLobe() && !lights_.empty() && options_.strategy != Strategy::BsdfOnly;
-        // Four pairs at once where all are wanted, else only those that are.
-        std::array<Vec2, dimension::kPerBounce> pairs;
-        if constexpr (F.reflection) pairs = sampler.bounce(bounce);
-        const auto pair = [&](std::uint32_t use) {
-            return F.reflection ? pairs[use] : sampler.pair(dimension::atBounce(bounce, use));
-        };
+        // The bounce's four pairs at once: two of them one by one would take longer.
+        const auto pairs = sampler.bounce(bounce);
         if (lightsSampled) {
             lights_.prepare(local, {point.position, point.shadingNormal, F.glass && material.transmissive()});
-            const float choice = choosesLights_ ? pair(dimension::kLightChoice).x : 0;
+            const float choice = choosesLights_ ? pairs[dimension::kLightChoice].x : 0;
             result.radiance += throughput * directLight<F>(point, frame, bsdf, local, choice,
-                                                           pair(dimension::kLight), state);
+                                                           pairs[dimension::kLight], state);
         }
 
-        Vec2 choice;
-        if (F.reflection || bounce >= kSureBounces) choice = pair(dimension::kChoice);
-        const BsdfSample next = bsdf.sample(pair(dimension::kDirection), choice.x);
+        const Vec2 choice = pairs[dimension::kChoice];
+        const BsdfSample next = bsdf.sample(pairs[dimension::kDirection], choice.x);
         if (isBlack(next.weight)) break;
         const Vec3 direction = normalized(frame.toWorld(next.wi));
         if (!consistent<F>(point, direction, next.wi.z)) break;

@@ -68,7 +68,7 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     for (const PlannedEffect& e : plan.effects)
         if (plan.leftOut.has(e.effect))
             leftOut += (leftOut.empty() ? "" : ",") + std::string(nameOf(e.effect));
-    if (!leftOut.empty()) header.extra["variolux:effectsLeftOut"] = leftOut;
+    if (!leftOut.empty()) header.extra["effectsLeftOut"] = leftOut;
     header.seed = static_cast<std::int64_t>(options.seed);
     if (!options.hierarchical) header.samples = options.spp;
     if (options.earlier != nullptr) {

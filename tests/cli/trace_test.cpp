@@ -136,7 +136,7 @@ TEST(VlxTrace, EffectsLeftOutAreWarnedOfAndInTheHeader) {
     const DumpHeader header = DumpReader(folder / "a.exr").header();
     EXPECT_EQ(std::ranges::count(header.effects, "caustics"), 0);
     EXPECT_EQ(std::ranges::count(header.effects, "clearcoat"), 1);
-    EXPECT_EQ(header.extra.at("variolux:effectsLeftOut"), "caustics");
+    EXPECT_EQ(header.extra.at("effectsLeftOut"), "caustics");
     EXPECT_EQ(nlohmann::json::parse(run.out)["effects"], nlohmann::json(header.effects));
 }
 
