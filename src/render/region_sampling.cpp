@@ -183,9 +183,11 @@ void samplePixel(int column, int row, int count, std::uint32_t replicate, std::u
     s.row = row;
     s.replicate = replicate;
     s.seed = pixelSeed(seed, column, row, static_cast<int>(replicate));
+    std::array<Vec2, 4> positions;
     for (int i = 0; i < count; ++i) {
         s.index = static_cast<std::uint32_t>(i);
-        const Vec2 u = PathSampler(s.seed, s.index).pair(dimension::kPixel);
+        if (i % 4 == 0) positions = PathSampler::ofFour(s.seed, s.index, dimension::kPixel);
+        const Vec2 u = positions[s.index % 4];
         s.x = rasterFloor(static_cast<double>(column) + u.x);
         s.y = rasterFloor(static_cast<double>(row) + u.y);
         shade(s);

@@ -81,6 +81,29 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     return header;
 }
 
+/// A band's channels, to be written sample by sample.
+class ChannelArrays {
+  public:
+    explicit ChannelArrays(SampleBand& band) : count_(band.values.size()) {
+        for (std::size_t c = 0; c < count_; ++c) channels_[c] = band.values[c].data();
+    }
+    void put(std::uint64_t at, const Record& r) const {
+        const PathSample& s = r.sample;
+        const std::array<float, 14> values = {s.radiance.x, s.radiance.y,
+                                              s.radiance.z, s.hit ? 1.f : 0.f,
+                                              s.depth,      r.x,
+                                              r.y,          s.albedo.x,
+                                              s.albedo.y,   s.albedo.z,
+                                              s.normal.x,   s.normal.y,
+                                              s.normal.z,   static_cast<float>(r.replicate)};
+        for (std::size_t c = 0; c < count_; ++c) channels_[c][at] = values[c];
+    }
+
+  private:
+    std::array<float*, 14> channels_{};
+    std::size_t count_;
+};
+
 class BandTracer {
   public:
     BandTracer(const PathTracer& tracer, const View& view, const RenderOptions& options,
@@ -106,18 +129,47 @@ class BandTracer {
         const int down = (rows.y + rows.height - 1) / kRegionSize - firstY + 1;
         regions_.resize(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
         const auto count = static_cast<std::int64_t>(regions_.size());
+        SampleBand band = bandOf(rows);
+        // Where each pixel gets as many samples, their places are known and they go there at once.
+        const bool even = !options_.hierarchical && options_.map == nullptr;
+        if (even) {
+            for (std::size_t p = 0; p <= band.pixels(); ++p)
+                band.offsets[p] = p * static_cast<std::uint64_t>(options_.spp);
+            allocate(band);
+        }
+        const ChannelArrays direct(band);
         parallelFor(0, count, [&](std::int64_t i) {
             const int rx = firstX + static_cast<int>(i % across), ry = firstY + static_cast<int>(i / across);
-            traceRegion(rx, ry, rows, regions_[static_cast<std::size_t>(i)]);
+            traceRegion(rx, ry, rows, regions_[static_cast<std::size_t>(i)], even ? &direct : nullptr);
             regionDone(1);
         });
-        return gather(rows);
+        if (!even) gather(rows, band);
+        return band;
     }
 
     const std::vector<RegionResult>& regions() const { return regions_; }
 
   private:
-    void traceRegion(int rx, int ry, const Window& rows, RegionResult& out) const {
+    SampleBand bandOf(const Window& rows) const {
+        SampleBand band;
+        band.x = rows.x;
+        band.y = rows.y;
+        band.width = rows.width;
+        band.height = rows.height;
+        band.offsets.assign(band.pixels() + 1, 0);
+        return band;
+    }
+
+    void allocate(SampleBand& band) const {
+        for (const DumpChannel& channel : header_.channels) {
+            band.channels.push_back(channel.name);
+            band.values.emplace_back(band.samples());
+        }
+    }
+
+    /// Into the region's records, or straight into the band.
+    void traceRegion(int rx, int ry, const Window& rows, RegionResult& out,
+                     const ChannelArrays* direct) const {
         out.window = clipped(rx, ry, rows);
         out.records.clear();
         out.counts.fill(0);
@@ -133,8 +185,14 @@ class BandTracer {
                 sample.radiance = {};
             }
             const int pixel = (s.row - top) * kRegionSize + (s.column - left);
-            ++out.counts[static_cast<std::size_t>(pixel)];
-            out.records.push_back({pixel, s.x, s.y, s.replicate, sample});
+            const std::uint32_t number = out.counts[static_cast<std::size_t>(pixel)]++;
+            const Record record{pixel, s.x, s.y, s.replicate, sample};
+            if (direct == nullptr) {
+                out.records.push_back(record);
+            } else {
+                const std::int64_t place = std::int64_t{s.row - rows.y} * rows.width + (s.column - rows.x);
+                direct->put(static_cast<std::uint64_t>(place * options_.spp) + number, record);
+            }
             return sample.radiance;
         };
         if (options_.hierarchical) {
@@ -153,13 +211,7 @@ class BandTracer {
     }
 
     /// The regions' samples in the band's order: pixel by pixel, each pixel's in the order they were taken.
-    SampleBand gather(const Window& rows) const {
-        SampleBand band;
-        band.x = rows.x;
-        band.y = rows.y;
-        band.width = rows.width;
-        band.height = rows.height;
-        band.offsets.assign(band.pixels() + 1, 0);
+    void gather(const Window& rows, SampleBand& band) const {
         const auto forPixels = [&](const RegionResult& region, auto visit) {
             const int left = floorToRegion(region.window.x), top = floorToRegion(region.window.y);
             for (int y = region.window.y; y < region.window.y + region.window.height; ++y)
@@ -173,31 +225,15 @@ class BandTracer {
                 band.offsets[pixel + 1] = region.counts[local];
             });
         for (std::size_t p = 0; p < band.pixels(); ++p) band.offsets[p + 1] += band.offsets[p];
-        for (const DumpChannel& channel : header_.channels) {
-            band.channels.push_back(channel.name);
-            band.values.emplace_back(band.samples());
-        }
+        allocate(band);
+        const ChannelArrays arrays(band);
         parallelFor(0, static_cast<std::int64_t>(regions_.size()), [&](std::int64_t i) {
             const RegionResult& region = regions_[static_cast<std::size_t>(i)];
             std::array<std::uint64_t, kRegionSize * kRegionSize> next{};
             forPixels(region,
                       [&](std::size_t local, std::size_t pixel) { next[local] = band.offsets[pixel]; });
-            std::array<float*, 14> channel{};
-            for (std::size_t c = 0; c < band.values.size(); ++c) channel[c] = band.values[c].data();
-            for (const Record& r : region.records) {
-                const PathSample& s = r.sample;
-                const std::array<float, 14> values = {s.radiance.x, s.radiance.y,
-                                                      s.radiance.z, s.hit ? 1.f : 0.f,
-                                                      s.depth,      r.x,
-                                                      r.y,          s.albedo.x,
-                                                      s.albedo.y,   s.albedo.z,
-                                                      s.normal.x,   s.normal.y,
-                                                      s.normal.z,   static_cast<float>(r.replicate)};
-                const std::uint64_t at = next[static_cast<std::size_t>(r.pixel)]++;
-                for (std::size_t c = 0; c < band.values.size(); ++c) channel[c][at] = values[c];
-            }
+            for (const Record& r : region.records) arrays.put(next[static_cast<std::size_t>(r.pixel)]++, r);
         });
-        return band;
     }
 
     const PathTracer& tracer_;

@@ -58,13 +58,18 @@ class PathSampler {
         }
         const Words reversed{reversedIndex_, reversedIndex_, reversedIndex_, reversedIndex_};
         const Words index = reversedBits(scrambled(reversed, order));
-        x = reversedBits(scrambled(index, x)) >> 8;
-        y = reversedBits(scrambled(secondDigits(index), y)) >> 8;
-        std::array<Vec2, dimension::kPerBounce> pairs;
-        for (std::uint32_t i = 0; i < dimension::kPerBounce; ++i)
-            pairs[i] = {static_cast<float>(static_cast<std::int32_t>(x[i])) * 0x1p-24f,
-                        static_cast<float>(static_cast<std::int32_t>(y[i])) * 0x1p-24f};
-        return pairs;
+        return points(reversedBits(scrambled(index, x)), reversedBits(scrambled(secondDigits(index), y)));
+    }
+
+    /// The same pair of four samples in turn, from number `first` on.
+    static std::array<Vec2, 4> ofFour(std::uint64_t seed, std::uint32_t first, std::uint32_t dimensionPair) {
+        const std::uint64_t hash = mixBits(seed + dimensionPair * 0x9e3779b97f4a7c15u);
+        const SobolSeeds seeds = SobolSeeds::from(mixBits(hash));
+        const Words none{}, numbers = Words{0, 1, 2, 3} + first;
+        const Words index =
+            reversedBits(scrambled(reversedBits(numbers), none + static_cast<std::uint32_t>(hash)));
+        return points(reversedBits(scrambled(index, none + seeds.x)),
+                      reversedBits(scrambled(secondDigits(index), none + seeds.y)));
     }
 
     /// A seed that belongs to this sample alone, for hashed decisions along the path.
@@ -77,6 +82,15 @@ class PathSampler {
     using Words [[gnu::vector_size(16)]] = std::uint32_t;
     static_assert(dimension::kPerBounce == 4);
 
+    static std::array<Vec2, 4> points(Words x, Words y) {
+        x >>= 8;
+        y >>= 8;
+        std::array<Vec2, 4> pairs;
+        for (std::uint32_t i = 0; i < 4; ++i)
+            pairs[i] = {static_cast<float>(static_cast<std::int32_t>(x[i])) * 0x1p-24f,
+                        static_cast<float>(static_cast<std::int32_t>(y[i])) * 0x1p-24f};
+        return pairs;
+    }
     static Words reversedBits(Words v) {
         v = ((v >> 16) & 0x0000ffffu) | (v << 16);
         v = ((v >> 8) & 0x00ff00ffu) | ((v & 0x00ff00ffu) << 8);
