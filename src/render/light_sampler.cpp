@@ -40,16 +40,19 @@ void LightSampler::addTriangles(const Light& light) {
 void LightSampler::estimate(Local& local) const {
     const Receiver& receiver = local.receiver;
     if (candidates_.size() > kLocalLights) return;
-    LightQuad::Floats sums{};
-    LightQuad::Mask possible{};
     for (std::size_t i = 0; i < quads_.size(); ++i) {
         const LightQuad::Floats w = quads_[i].importance(receiver);
         for (std::size_t lane = 0; lane < 4; ++lane) local.weights[4 * i + lane] = w[lane];
-        sums += w;
-        possible -= w > LightQuad::Floats{};
     }
-    local.sum = sums[0] + sums[1] + sums[2] + sums[3];
-    local.possible = static_cast<std::uint32_t>(possible[0] + possible[1] + possible[2] + possible[3]);
+    // In the order of the lights, so that lights that reach nothing change no bit.
+    float sum = 0;
+    std::uint32_t possible = 0;
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+        sum += local.weights[i];
+        possible += local.weights[i] > 0;
+    }
+    local.sum = sum;
+    local.possible = possible;
 }
 
 LightSampler::Choice LightSampler::choose(const Local& local, float u) const {
