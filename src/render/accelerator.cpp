@@ -114,7 +114,7 @@ struct Accelerator::Impl {
         FilterData& data = filters[index];
         data = {&scene, &shape, !material.visibleFromBehind(),
                 effects.has(Effect::Alpha) && material.alphaMode != AlphaMode::Opaque};
-        if (data.seeThroughBack || data.seeThroughOpacity || effects == EffectSet::all()) {
+        if (data.seeThroughBack || data.seeThroughOpacity) {
             rtcSetGeometryUserData(geometry, &data);
             rtcSetGeometryIntersectFilterFunction(geometry, filter);
             rtcSetGeometryOccludedFilterFunction(geometry, filter);

@@ -37,9 +37,8 @@ struct RecordedRay {
 /// ray's seed and the triangle: the same for as long as the seed is the same.
 class Accelerator {
   public:
-    /// Refers to the scene's vertices and triangles, which must outlive it unchanged. Filters and motion only
-    /// where `effects` has alpha or object motion; with all effects every surface has a filter, as if nothing
-    /// were known of the scene. Throws Error when Embree fails (out of memory).
+    /// Refers to the scene's vertices and triangles, which must outlive it unchanged. Filters of opacity only
+    /// when `effects` has alpha. Throws Error when Embree fails (out of memory).
     explicit Accelerator(const Scene& scene, const EffectSet& effects = EffectSet::all());
     ~Accelerator();
     Accelerator(const Accelerator&) = delete;
