@@ -45,8 +45,7 @@ class PathSampler {
         return {unitFloat(p.x), unitFloat(p.y)};
     }
 
-    /// All pairs of a bounce, kDirection to kLightChoice, at once: the same numbers as pair() gives, in a
-    /// third of the time.
+    /// All pairs of a bounce, kDirection to kLightChoice, side by side: the same numbers as pair() gives.
     std::array<Vec2, dimension::kPerBounce> bounce(int number) const {
         Words order, x, y;
         for (std::uint32_t i = 0; i < dimension::kPerBounce; ++i) {
