@@ -1,11 +1,15 @@
 // vlx-trace: traces a glTF scene into a dump of samples.
 
+#include <malloc.h>
+
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "pilot.h"
+#include "plan.h"
 #include "progress_bar.h"
 #include "render.h"
 #include "scene_loader.h"
@@ -29,6 +33,13 @@ struct TraceCommand {
     int threads = 0;
     bool listCameras = false;
     bool json = false;
+    std::string effects = "auto";
+    std::string explain;
+    std::vector<double> shutter;
+    double timeLimit = 0;
+    double targetError = 0;
+    std::string earlierPath;
+    std::string mapPath;
     RenderOptions options;
 
     void bind(CLI::App& app) {
@@ -68,6 +79,31 @@ struct TraceCommand {
             ->check(CLI::NonNegativeNumber)
             ->needs(hierarchical)
             ->capture_default_str();
+        auto* time = app.add_option("--time", timeLimit,
+                                    "Take as many samples a pixel as this many seconds of tracing allow,\n"
+                                    "judged by a short pilot")
+                         ->check(CLI::PositiveNumber)
+                         ->excludes(spp)
+                         ->excludes(hierarchical)
+                         ->type_name("SECONDS");
+        app.add_option("--target-error", targetError,
+                       "Take as many samples a pixel as bring the relMSE of the plain average down to\n"
+                       "this, judged by a short pilot (before reconstruction)")
+            ->check(CLI::PositiveNumber)
+            ->excludes(spp)
+            ->excludes(hierarchical)
+            ->excludes(time)
+            ->type_name("RELMSE");
+        app.add_option("--append", earlierPath,
+                       "A dump of the same view: its samples are kept, --spp more are added to\n"
+                       "them, and both are written to the output")
+            ->excludes(hierarchical)
+            ->type_name("DUMP");
+        app.add_option("--sample-map", mapPath,
+                       "Where samples are wanted: an image with a channel sampling.density (or Y),\n"
+                       ">= 0, relative to its mean. --spp is then the mean over the picture")
+            ->excludes(hierarchical)
+            ->type_name("MAP");
         app.add_option("--replicates", options.replicates,
                        "Divide the samples of each pixel into this many independent randomisations\n"
                        "(written as sample.replicate)")
@@ -87,6 +123,22 @@ struct TraceCommand {
         app.add_option("--env", environment.image,
                        "Latitude-longitude image of the environment (EXR, HDR, ...); its middle is -z")
             ->excludes(constant);
+        app.add_option("--effects", effects,
+                       "What to simulate: auto, what the scene calls for; all, everything (the general\n"
+                       "tracer, slower); auto,-NAME,... leaves effects out, which biases the image.\n"
+                       "--explain prints their names")
+            ->type_name("auto|all|auto,-NAME")
+            ->capture_default_str();
+        app.add_flag("--explain{text}", explain,
+                     "Print which effects the scene calls for, why, and what part of the time each takes\n"
+                     "(from a short pilot), and end; --explain=json: the same as JSON")
+            ->check(CLI::IsMember({"text", "json"}));
+        app.add_option("--shutter", shutter,
+                       "When the shutter opens and closes, in seconds of the scene's animations\n"
+                       "(default: 0,0.0208; equal times freeze the picture)")
+            ->delimiter(',')
+            ->expected(2)
+            ->type_name("OPEN,CLOSE");
         app.add_option("--threads", threads, "0: all processors. The result does not depend on it")
             ->check(CLI::Range(0, 4096))
             ->capture_default_str();
@@ -98,26 +150,50 @@ struct TraceCommand {
     }
 
     int run() {
-        if (dump.empty() && !listCameras) throw CLI::RequiredError("--output");
-        if (!listCameras) vlx::checkOutputName(dump, {scene});
+        const bool renders = !listCameras && explain.empty();
+        if (dump.empty() && renders) throw CLI::RequiredError("--output");
+        if (renders) vlx::checkOutputName(dump, {scene, earlierPath, mapPath});
+        std::string broken;
+        const auto request = parseEffects(effects, broken);
+        if (!request) throw CLI::ValidationError("--effects", broken);
+        Shutter exposure;
+        if (shutter.size() == 2) exposure = {shutter[0], shutter[1]};
+        if (!std::isfinite(exposure.open) || !std::isfinite(exposure.close) || exposure.close < exposure.open)
+            throw CLI::ValidationError("--shutter",
+                                       "expected two finite times, the second not before the first");
         for (const float value : environmentConstant)
             if (!std::isfinite(value)) throw CLI::ValidationError("--env-constant", "expected finite values");
         if (environmentConstant.size() == 3)
             environment.constant =
                 Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
         const vlx::ThreadLimit limit(threads);
-        const Scene loaded = loadScene(scene, environment);
+        Scene loaded = loadScene(scene, environment, exposure);
         if (listCameras) return printCameras(loaded);
         options.camera = chosenCamera(loaded);
+        std::optional<EarlierDump> earlier;
+        if (!earlierPath.empty()) takeSizeOf(earlier.emplace(earlierPath));
         setSize(loaded.cameras[options.camera]);
         if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
         options.version = VARIOLUX_VERSION;
-        if (const auto broken = options.validate(loaded)) throw CLI::ValidationError(*broken);
+        if (const auto fault = options.validate(loaded)) throw CLI::ValidationError(*fault);
         for (const std::string& warning : loaded.report.warnings) note("warning: " + warning);
         if (loaded.report.degenerateTriangles > 0)
             note(std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");
 
-        const Accelerator accelerator(loaded);
+        std::optional<SampleMap> map;
+        if (!mapPath.empty()) {
+            const vlx::Window whole{0, 0, options.width, options.height};
+            options.map = &map.emplace(mapPath, options.crop.value_or(whole));
+        }
+        const Plan plan = planEffects(
+            loaded, {options.camera, options.width, options.height, options.path.maxBounces, *request});
+        for (const std::string& warning : plan.warnings) note("warning: " + warning);
+        applyPlan(loaded, plan);
+        options.follow(plan);
+        if (!explain.empty()) return printPlan(loaded, plan);
+
+        const Accelerator accelerator(loaded, options.path.effects);
+        if (timeLimit > 0 || targetError > 0) chooseSamples(loaded, accelerator);
         RenderReport report;
         {
             vlx::ProgressBar bar("tracing");
@@ -144,6 +220,31 @@ struct TraceCommand {
         return vlx::kDone;
     }
 
+    int printPlan(const Scene& loaded, const Plan& plan) const {
+        const auto shares = pilotShares(loaded, plan, options);
+        if (explain == "json") {
+            nlohmann::ordered_json list = nlohmann::ordered_json::array();
+            for (const PlannedEffect& e : plan.effects) {
+                nlohmann::ordered_json j{
+                    {"name", nameOf(e.effect)}, {"planned", e.planned}, {"reason", e.reason}};
+                const auto share = shares[static_cast<std::size_t>(e.effect)];
+                if (share) j["share"] = std::round(*share * 1000) / 1000;
+                list.push_back(std::move(j));
+            }
+            std::cout << nlohmann::ordered_json{{"effects", list}, {"lights", loaded.lights.size()}}.dump(2)
+                      << "\n";
+            return vlx::kDone;
+        }
+        std::printf("%-19s%-9s%-7s%s\n", "effect", "planned", "cost", "reason");
+        for (const PlannedEffect& e : plan.effects) {
+            const auto share = shares[static_cast<std::size_t>(e.effect)];
+            const std::string cost = share ? std::to_string(std::lround(*share * 100)) + " %" : "";
+            std::printf("%-19s%-9s%-7s%s\n", std::string(nameOf(e.effect)).c_str(), e.planned ? "yes" : "no",
+                        cost.c_str(), e.reason.c_str());
+        }
+        return vlx::kDone;
+    }
+
     std::size_t chosenCamera(const Scene& loaded) const {
         if (camera.empty()) return loaded.activeCamera;
         for (std::size_t i = 0; i < loaded.cameras.size(); ++i)
@@ -154,6 +255,37 @@ struct TraceCommand {
         std::string names;
         for (const Camera& c : loaded.cameras) names += (names.empty() ? "'" : ", '") + c.name + "'";
         throw vlx::Error(scene, "has no camera '" + camera + "'; it has " + names);
+    }
+
+    /// The picture of the dump that is added to, where the command line names none.
+    void takeSizeOf(const EarlierDump& earlier) {
+        options.earlier = &earlier;
+        const vlx::DumpHeader& header = earlier.header();
+        if (width == 0 && height == 0) {
+            width = header.display.width;
+            height = header.display.height;
+        }
+        if (crop.empty() && header.data != header.display)
+            crop = {header.data.x, header.data.y, header.data.width, header.data.height};
+    }
+
+    /// --time and --target-error.
+    void chooseSamples(const Scene& loaded, const Accelerator& accelerator) {
+        constexpr double kBeside = 1.2;  // gathering and writing the samples takes time too
+        const PilotMeasure pilot =
+            pilotMeasure(loaded, accelerator, options, std::min(1.0, 0.05 * std::max(timeLimit, 1.0)));
+        const vlx::Window whole{0, 0, options.width, options.height};
+        const auto pixels = static_cast<double>(options.crop.value_or(whole).pixels());
+        const double wanted =
+            timeLimit > 0
+                ? std::floor((timeLimit - pilot.seconds) / (kBeside * pixels * pilot.secondsPerSample))
+                : std::ceil(pilot.relativeVariance / targetError);
+        const auto replicates = static_cast<double>(options.replicates);
+        const double most = std::floor((1 << 24) / replicates) * replicates;
+        const double rounded =
+            replicates * (timeLimit > 0 ? std::floor(wanted / replicates) : std::ceil(wanted / replicates));
+        options.spp = static_cast<int>(std::clamp(rounded, replicates, most));
+        note(std::to_string(options.spp) + " samples a pixel");
     }
 
     void setSize(const Camera& chosen) {
@@ -178,6 +310,7 @@ struct TraceCommand {
                                      {"height", options.height},
                                      {"triangles", loaded.triangleCount()},
                                      {"lights", loaded.lights.size()},
+                                     {"effects", options.plan->simulated()},
                                      {"samples", report.samples},
                                      {"nonFinite", report.nonFinite},
                                      {"degenerateTriangles", loaded.report.degenerateTriangles},
@@ -187,6 +320,7 @@ struct TraceCommand {
                                      {"traceCpuSeconds", report.traceCpuSeconds},
                                      {"writeCpuSeconds", report.writeCpuSeconds},
                                      {"warnings", loaded.report.warnings}};
+            if (!options.hierarchical) j["samplesPerPixel"] = options.spp;
             if (options.hierarchical) j["refinedCells"] = report.refinedCells;
             std::cout << j.dump(2) << "\n";
         }
@@ -201,6 +335,11 @@ struct TraceCommand {
 }  // namespace
 
 int main(int argc, char** argv) {
+#ifdef __GLIBC__
+    // Bands of samples come and go all the time: their memory is kept, not given back and cleared anew.
+    mallopt(M_MMAP_THRESHOLD, 1 << 28);
+    mallopt(M_TRIM_THRESHOLD, 1 << 28);
+#endif
     CLI::App app("Trace a glTF scene by path tracing into a dump of samples.", "vlx-trace");
     TraceCommand command;
     command.bind(app);

@@ -61,7 +61,7 @@ RTCRay toEmbree(const Ray& ray, float distance) {
     r.dir_x = ray.direction.x;
     r.dir_y = ray.direction.y;
     r.dir_z = ray.direction.z;
-    r.time = 0;
+    r.time = ray.time;
     r.tfar = distance;
     r.mask = 0xffffffffu;
     r.id = 0;
@@ -86,8 +86,9 @@ struct Accelerator::Impl {
     std::vector<std::array<float, 4>> spheres;
     std::vector<std::int32_t> sphereLights;
     const Scene& scene;
+    EffectSet effects;
 
-    explicit Impl(const Scene& s) : scene(s) {}
+    Impl(const Scene& s, const EffectSet& e) : scene(s), effects(e) {}
     ~Impl() {
         if (top != nullptr) rtcReleaseScene(top);
         for (RTCScene group : groups) rtcReleaseScene(group);
@@ -111,7 +112,8 @@ struct Accelerator::Impl {
                                    sizeof(scene.triangles[0]), shape.triangles);
         const Material& material = scene.materials[shape.material];
         FilterData& data = filters[index];
-        data = {&scene, &shape, !material.visibleFromBehind(), material.alphaMode != AlphaMode::Opaque};
+        data = {&scene, &shape, !material.visibleFromBehind(),
+                effects.has(Effect::Alpha) && material.alphaMode != AlphaMode::Opaque};
         if (data.seeThroughBack || data.seeThroughOpacity) {
             rtcSetGeometryUserData(geometry, &data);
             rtcSetGeometryIntersectFilterFunction(geometry, filter);
@@ -141,11 +143,19 @@ struct Accelerator::Impl {
     void attachInstance(const Instance& instance, std::uint32_t id) {
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
         rtcSetGeometryInstancedScene(geometry, groups[instance.group]);
-        std::array<float, 12> rows;
-        for (std::size_t i = 0; i < 3; ++i)
-            for (std::size_t j = 0; j < 4; ++j)
-                rows[i * 4 + j] = static_cast<float>(instance.toWorld.m[i][j]);
-        rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, rows.data());
+        const auto setPlace = [&](unsigned int step, const Transform& toWorld) {
+            std::array<float, 12> rows;
+            for (std::size_t i = 0; i < 3; ++i)
+                for (std::size_t j = 0; j < 4; ++j) rows[i * 4 + j] = static_cast<float>(toWorld.m[i][j]);
+            rtcSetGeometryTransform(geometry, step, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, rows.data());
+        };
+        if (instance.motion < 0) {
+            setPlace(0, instance.toWorld);
+        } else {
+            const auto& places = scene.motions[static_cast<std::size_t>(instance.motion)].places;
+            rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned int>(places.size()));
+            for (std::size_t i = 0; i < places.size(); ++i) setPlace(static_cast<unsigned int>(i), places[i]);
+        }
         rtcCommitGeometry(geometry);
         rtcAttachGeometryByID(top, geometry, id);
         rtcReleaseGeometry(geometry);
@@ -169,7 +179,7 @@ struct Accelerator::Impl {
     std::uint32_t firstInstance() const { return scene.worldShapes + 1; }
 };
 
-Accelerator::Accelerator(const Scene& scene) : impl_(new Impl(scene)) {
+Accelerator::Accelerator(const Scene& scene, const EffectSet& effects) : impl_(new Impl(scene, effects)) {
     Impl& im = *impl_;
     im.device = rtcNewDevice("set_affinity=0");
     check(im.device);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "effect_set.h"
 #include "vec.h"
 
 namespace vlx::render {
@@ -30,15 +31,15 @@ struct RecordedRay {
     bool shadow = false;
 };
 
-/// Hit tests through Embree: a static scene, robust (watertight) traversal. Surfaces that let rays through
-/// (alpha mask and blend, backs of single-sided surfaces) have filters; others pay nothing for them. Blended
-/// surfaces are met with the probability of their opacity, decided by a hash of the ray's seed and the
-/// triangle: the same for as long as the seed is the same.
+/// Hit tests through Embree: robust (watertight) traversal; instances move when the scene says so. Surfaces
+/// that let rays through (alpha mask and blend, backs of single-sided surfaces) have filters; others pay
+/// nothing for them. Blended surfaces are met with the probability of their opacity, decided by a hash of the
+/// ray's seed and the triangle: the same for as long as the seed is the same.
 class Accelerator {
   public:
-    /// Refers to the scene's vertices and triangles, which must outlive it unchanged. Throws Error when
-    /// Embree fails (out of memory).
-    explicit Accelerator(const Scene& scene);
+    /// Refers to the scene's vertices and triangles, which must outlive it unchanged. Filters of opacity only
+    /// when `effects` has alpha. Throws Error when Embree fails (out of memory).
+    explicit Accelerator(const Scene& scene, const EffectSet& effects = EffectSet::all());
     ~Accelerator();
     Accelerator(const Accelerator&) = delete;
     Accelerator& operator=(const Accelerator&) = delete;

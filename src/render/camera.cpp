@@ -1,5 +1,6 @@
 #include "camera.h"
 
+#include "effect_counters.h"
 #include "sampling.h"
 
 namespace vlx::render {
@@ -9,24 +10,47 @@ View::View(const Camera& camera, int width, int height)
       width_(width),
       height_(height),
       tanHalf_(std::tan(0.5 * static_cast<double>(camera.verticalFov))),
-      origin_(camera.toWorld.point({0, 0, 0})),
-      lensX_(camera.toWorld.vector({1, 0, 0}) * camera.lensRadius),
-      lensY_(camera.toWorld.vector({0, 1, 0}) * camera.lensRadius),
       lensRadius_(camera.lensRadius),
       focusDistance_(camera.focusDistance) {
-    const auto pixel = static_cast<float>(2 * tanHalf_ / height_);
-    dx_ = camera.toWorld.vector({pixel, 0, 0});
-    dy_ = camera.toWorld.vector({0, -pixel, 0});
-    corner_ = camera.toWorld.vector(
-        {static_cast<float>(-tanHalf_ * width_ / height_), static_cast<float>(tanHalf_), -1});
+    if (camera.motion.moves()) {
+        for (const Transform& place : camera.motion.places) frames_.push_back(frameAt(place));
+    } else {
+        frames_.push_back(frameAt(camera.toWorld));
+    }
 }
 
-Ray View::ray(float x, float y, Vec2 lens) const {
-    const Vec3 along = corner_ + dx_ * x + dy_ * y;
-    if (lensRadius_ <= 0) return {origin_, normalized(along)};
-    const Vec2 d = toDisk(lens);
-    const Vec3 offset = lensX_ * d.x + lensY_ * d.y;
-    return {origin_ + offset, normalized(along * focusDistance_ - offset)};
+View::CameraFrame View::frameAt(const Transform& toWorld) const {
+    const auto pixel = static_cast<float>(2 * tanHalf_ / height_);
+    CameraFrame f;
+    f.origin = toWorld.point({0, 0, 0});
+    f.corner =
+        toWorld.vector({static_cast<float>(-tanHalf_ * width_ / height_), static_cast<float>(tanHalf_), -1});
+    f.dx = toWorld.vector({pixel, 0, 0});
+    f.dy = toWorld.vector({0, -pixel, 0});
+    f.lensX = toWorld.vector({1, 0, 0}) * lensRadius_;
+    f.lensY = toWorld.vector({0, 1, 0}) * lensRadius_;
+    return f;
+}
+
+Ray View::ray(float x, float y, Vec2 lens, float time) const {
+    const auto through = [&](const CameraFrame& f) -> Ray {
+        const Vec3 along = f.corner + f.dx * x + f.dy * y;
+        if (lensRadius_ <= 0) return {f.origin, normalized(along), time};
+        countEffect(Effect::DepthOfField);
+        const Vec2 d = toDisk(lens);
+        const Vec3 offset = f.lensX * d.x + f.lensY * d.y;
+        return {f.origin + offset, normalized(along * focusDistance_ - offset), time};
+    };
+    if (frames_.size() == 1) return through(frames_.front());
+    countEffect(Effect::CameraMotion);
+    const float position = time * static_cast<float>(frames_.size() - 1);
+    const auto first = std::min(static_cast<std::size_t>(position), frames_.size() - 2);
+    const float t = position - static_cast<float>(first);
+    const CameraFrame& a = frames_[first];
+    const CameraFrame& b = frames_[first + 1];
+    const auto mix = [t](const Vec3& p, const Vec3& q) { return p * (1 - t) + q * t; };
+    return through({mix(a.origin, b.origin), mix(a.corner, b.corner), mix(a.dx, b.dx), mix(a.dy, b.dy),
+                    mix(a.lensX, b.lensX), mix(a.lensY, b.lensY)});
 }
 
 std::vector<float> View::worldToCamera() const {

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "motion.h"
 #include "transform.h"
 #include "vec.h"
 
@@ -11,7 +12,8 @@ namespace vlx::render {
 /// A glTF perspective camera: looks along its own -z, y up.
 struct Camera {
     std::string name;
-    Transform toWorld;         ///< rotation and translation
+    Transform toWorld;  ///< rotation and translation; in the middle of the exposure, when it moves
+    Motion motion;
     float verticalFov = 0.8f;  ///< radians
     float aspect = 0;          ///< width / height; 0: as the image
     float lensRadius = 0;      ///< metres; 0: pinhole
@@ -25,10 +27,11 @@ class View {
   public:
     View(const Camera& camera, int width, int height);
 
-    /// `lens` in [0, 1)^2: the point on the lens.
-    Ray ray(float x, float y, Vec2 lens) const;
+    /// `lens` in [0, 1)^2: the point on the lens. `time` in [0, 1): while the shutter is open.
+    Ray ray(float x, float y, Vec2 lens, float time = 0) const;
 
     bool hasLens() const { return lensRadius_ > 0; }
+    bool moves() const { return frames_.size() > 1; }
 
     /// OpenEXR's header attributes: 16 values, row vectors (p' = p M). NDC: x right, y up, both in [-1, 1].
     std::vector<float> worldToCamera() const;
@@ -38,10 +41,16 @@ class View {
     Transform toWorld_;
     double width_, height_;
     double tanHalf_;
-    Vec3 origin_;
-    Vec3 corner_;  ///< direction through raster (0, 0), at unit distance along the axis
-    Vec3 dx_, dy_;
-    Vec3 lensX_, lensY_;
+    /// All that a ray is made of, at one time.
+    struct CameraFrame {
+        Vec3 origin;
+        Vec3 corner;  ///< direction through raster (0, 0), at unit distance along the axis
+        Vec3 dx, dy;
+        Vec3 lensX, lensY;
+    };
+    CameraFrame frameAt(const Transform& toWorld) const;
+
+    std::vector<CameraFrame> frames_;  ///< at equal steps of time, or one
     float lensRadius_;
     float focusDistance_;
 };

@@ -22,8 +22,13 @@ void setBounds(Scene& scene) {
     for (std::uint32_t i = 0; i < scene.worldShapes; ++i) includeShape(scene.shapes[i], nullptr);
     for (const Instance& instance : scene.instances) {
         const Group& group = scene.groups[instance.group];
-        for (std::uint32_t i = 0; i < group.shapes; ++i)
-            includeShape(scene.shapes[group.firstShape + i], &instance.toWorld);
+        for (std::uint32_t i = 0; i < group.shapes; ++i) {
+            const Shape& shape = scene.shapes[group.firstShape + i];
+            includeShape(shape, &instance.toWorld);
+            if (instance.motion < 0) continue;
+            for (const Transform& place : scene.motions[static_cast<std::size_t>(instance.motion)].places)
+                includeShape(shape, &place);
+        }
     }
     if (low.x <= high.x) {
         scene.boundsMin = low;
@@ -45,13 +50,16 @@ int tableOf(std::vector<Table>& tables, float ior) {
 void prepareMaterials(Scene& scene) {
     tableOf(scene.albedoTables, 1.5f);
     for (Material& material : scene.materials) {
-        material.textured =
-            material.baseColourTexture || material.metallicRoughnessTexture || material.emissionTexture ||
-            material.normalTexture || material.transmissionTexture || material.specularTexture ||
-            material.specularColourTexture || material.clearcoatTexture || material.clearcoatRoughnessTexture;
+        material.textured = material.baseColourTexture || material.metallicRoughnessTexture ||
+                            material.emissionTexture || material.normalTexture ||
+                            material.transmissionTexture || material.specularTexture ||
+                            material.specularColourTexture || material.clearcoatTexture ||
+                            material.clearcoatRoughnessTexture || material.sheenColourTexture ||
+                            material.sheenRoughnessTexture;
         material.albedoTable = tableOf(scene.albedoTables, material.ior);
         if (material.transmissive() && square(material.roughness) >= kSmoothAlpha)
             material.glassTable = tableOf(scene.glassTables, material.ior);
+        if (!isBlack(material.sheenColour) && scene.sheenTables.empty()) scene.sheenTables.emplace_back();
     }
 }
 

@@ -62,18 +62,6 @@ float integrateGlass(float cosTheta, float roughness, float eta) {
     return static_cast<float>(kept / kPoints);
 }
 
-struct Position {
-    std::size_t cell;
-    float t;
-};
-
-/// Where a node coordinate in [0, 1] falls among `size` nodes.
-Position locate(float coordinate, std::size_t size) {
-    const float scaled = std::clamp(coordinate, 0.f, 1.f) * static_cast<float>(size - 1);
-    const std::size_t cell = std::min(static_cast<std::size_t>(scaled), size - 2);
-    return {cell, scaled - static_cast<float>(cell)};
-}
-
 }  // namespace
 
 AlbedoTable::AlbedoTable(float ior) : ior_(ior) {
@@ -106,21 +94,6 @@ AlbedoTable::AlbedoTable(float ior) : ior_(ior) {
     meanWeight_ = static_cast<float>(sum);
 }
 
-AlbedoTable::Row AlbedoTable::row(float roughness) const {
-    const auto [i, t] = locate(roughness, kSize);
-    Row row;
-    row.low_ = cells_[i].data();
-    row.high_ = cells_[i + 1].data();
-    row.t_ = t;
-    row.mean_ = means_[i] * (1 - t) + means_[i + 1] * t;
-    return row;
-}
-
-Albedo AlbedoTable::Row::at(float cosTheta) const {
-    const auto [j, t] = locate(std::sqrt(std::max(0.f, cosTheta)), kSize);
-    return (low_[j] * (1 - t) + low_[j + 1] * t) * (1 - t_) + (high_[j] * (1 - t) + high_[j + 1] * t) * t_;
-}
-
 GlassTable::GlassTable(float ior) : ior_(ior) {
     parallelFor(0, static_cast<std::int64_t>(kSize), [&](std::int64_t row) {
         const auto i = static_cast<std::size_t>(row);
@@ -134,8 +107,8 @@ GlassTable::GlassTable(float ior) : ior_(ior) {
 
 float GlassTable::kept(float cosTheta, float roughness, bool fromInside) const {
     const Side& side = sides_[fromInside ? 1 : 0];
-    const auto [i, s] = locate(roughness, kSize);
-    const auto [j, t] = locate(std::sqrt(std::max(0.f, cosTheta)), kSize);
+    const auto [i, s] = tablePosition(roughness, kSize);
+    const auto [j, t] = tablePosition(std::sqrt(std::max(0.f, cosTheta)), kSize);
     const auto along = [&](std::size_t r) { return side[r][j] * (1 - t) + side[r][j + 1] * t; };
     return along(i) * (1 - s) + along(i + 1) * s;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <vector>
@@ -10,7 +11,7 @@ namespace vlx::render {
 
 /// Directional albedo of single-scattering GGX reflection, split so that it is linear in the reflectances at
 /// normal (f0) and grazing incidence (f90): f0 (whole - grazing) + f90 grazing.
-struct Albedo {
+struct alignas(16) Albedo {
     float whole = 1;       ///< of a perfect reflector: 1 minus what masking and shadowing lose
     float conductor = 0;   ///< `grazing` of metals: the part weighted by Schlick's (1 - cos)^5
     float dielectric = 0;  ///< `grazing` of dielectrics: the part weighted by dielectricWeight
@@ -29,6 +30,18 @@ inline float dielectricWeight(float cosTheta, float eta, float f0) {
 
 /// Reflectance of a boundary at normal incidence.
 inline float normalReflectance(float ior) { return square((ior - 1) / (ior + 1)); }
+
+struct TablePosition {
+    std::size_t cell;
+    float t;
+};
+
+/// Where a node coordinate in [0, 1] falls among `size` nodes.
+inline TablePosition tablePosition(float coordinate, std::size_t size) {
+    const float scaled = std::clamp(coordinate, 0.f, 1.f) * static_cast<float>(size - 1);
+    const std::size_t cell = std::min(static_cast<std::size_t>(scaled), size - 2);
+    return {cell, scaled - static_cast<float>(cell)};
+}
 
 /// Albedo over the cosine to the normal and the roughness, and its cosine-weighted mean, for one index of
 /// refraction: what multiple-scattering compensation needs (Kulla, Conty, "Revisiting physically based
@@ -66,6 +79,21 @@ class AlbedoTable {
     std::array<std::array<Albedo, kSize>, kSize> cells_;
     std::array<Albedo, kSize> means_;
 };
+
+inline AlbedoTable::Row AlbedoTable::row(float roughness) const {
+    const auto [i, t] = tablePosition(roughness, kSize);
+    Row row;
+    row.low_ = cells_[i].data();
+    row.high_ = cells_[i + 1].data();
+    row.t_ = t;
+    row.mean_ = means_[i] * (1 - t) + means_[i + 1] * t;
+    return row;
+}
+
+inline Albedo AlbedoTable::Row::at(float cosTheta) const {
+    const auto [j, t] = tablePosition(std::sqrt(std::max(0.f, cosTheta)), kSize);
+    return (low_[j] * (1 - t) + low_[j + 1] * t) * (1 - t_) + (high_[j] * (1 - t) + high_[j + 1] * t) * t_;
+}
 
 /// Fraction of energy that single-scattering GGX reflection and refraction keep together at a dielectric
 /// boundary of one index of refraction, seen from each side.

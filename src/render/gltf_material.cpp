@@ -27,6 +27,19 @@ std::vector<double> numbers(const tinygltf::Value& object, const std::string& ke
     return out;
 }
 
+/// KHR_materials_volume: light keeps attenuationColor after attenuationDistance. A thickness of 0 says that
+/// the surface bounds no volume; where none is given, rays know it.
+Rgb absorption(const tinygltf::Value& volume) {
+    const double distance = number(volume, "attenuationDistance", 0);
+    if (!(distance > 0) || !std::isfinite(distance) || number(volume, "thicknessFactor", 1) == 0) return {};
+    const Rgb kept = colour(numbers(volume, "attenuationColor"), {1, 1, 1});
+    const auto coefficient = [&](float c) {
+        const double least = -std::log(std::clamp(static_cast<double>(c), 1e-9, 1.0)) / distance;
+        return static_cast<float>(std::min(least, 1e9));
+    };
+    return {coefficient(kept.x), coefficient(kept.y), coefficient(kept.z)};
+}
+
 Wrap wrapOf(int mode) {
     if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::Clamp;
     if (mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT) return Wrap::Mirror;
@@ -143,6 +156,14 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
         m.clearcoatRoughness = unit(number(*e, "clearcoatRoughnessFactor", 0));
         m.clearcoatRoughnessTexture = texture(*e, "clearcoatRoughnessTexture", Linear, what);
     }
+    if (const auto* e = extension(source.extensions, "KHR_materials_sheen")) {
+        m.sheenColour = colour(numbers(*e, "sheenColorFactor"), {0, 0, 0});
+        m.sheenColour = {unit(m.sheenColour.x), unit(m.sheenColour.y), unit(m.sheenColour.z)};
+        m.sheenColourTexture = texture(*e, "sheenColorTexture", Srgb, what);
+        m.sheenRoughness = unit(number(*e, "sheenRoughnessFactor", 0));
+        m.sheenRoughnessTexture = texture(*e, "sheenRoughnessTexture", Linear, what);
+    }
+    if (const auto* e = extension(source.extensions, "KHR_materials_volume")) m.absorption = absorption(*e);
     return m;
 }
 

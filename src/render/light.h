@@ -9,8 +9,6 @@
 
 namespace vlx::render {
 
-struct Scene;
-
 enum class LightType : std::uint8_t { Point, Spot, Directional, Sphere, Mesh, Environment };
 
 /// A light as next-event estimation sees it. Radiometric units.
@@ -77,79 +75,6 @@ class Environment {
     std::vector<Rgb> pixels_;
     Distribution rows_;
     std::vector<Distribution> columns_;  ///< one a row
-};
-
-/// The point that is lit: its shading normal lets lights behind an opaque surface be left out.
-struct Receiver {
-    Vec3 position;
-    Vec3 normal;
-    bool bothSides = false;  ///< light from behind counts (glass)
-};
-
-/// Direct light towards a receiver: a direction, what arrives along it unoccluded, and how likely it was.
-struct LightSample {
-    Vec3 direction;
-    float distance = 0;  ///< of the shadow ray
-    Rgb radiance;        ///< for delta lights: irradiance across the beam
-    float pdf = 0;       ///< per solid angle, choice of light included; for delta lights the latter only
-    bool delta = false;
-};
-
-/// Chooses among the lights of a scene in proportion to their unoccluded irradiance at the receiver (an
-/// estimate, with a floor for all that can reach it), or, beyond kLocalLights, to their power.
-/// Refers to the scene, which must outlive it.
-class LightSampler {
-  public:
-    static constexpr std::size_t kLocalLights = 32;
-
-    explicit LightSampler(const Scene& scene);
-
-    bool empty() const { return lights_.empty(); }
-    LightSample sample(const Receiver& receiver, float choice, Vec2 u) const;
-    /// Density with which sample() would have chosen the direction from `receiver` to a point of triangle
-    /// `triangle` (of its shape) of mesh light `light`, at `distance`, the light's cosine being `cosLight`.
-    float meshPdf(const Receiver& receiver, std::uint32_t light, std::uint32_t triangle, float distance,
-                  float cosLight) const;
-    float spherePdf(const Receiver& receiver, std::uint32_t light) const;
-    float environmentPdf(const Receiver& receiver, const Vec3& direction) const;
-
-  private:
-    /// What choosing among the lights takes, close together in memory.
-    struct Candidate {
-        Vec3 position;
-        float radius = 0;
-        Vec3 direction;
-        float strength = 0;  ///< greatest channel
-        float area = 0;
-        float coneScale = 0;
-        float coneOffset = 1;
-        LightType type = LightType::Point;
-    };
-    /// A triangle of a mesh light.
-    struct EmitterTriangle {
-        Vec3 corner, edge1, edge2;
-        Vec3 normal;
-        float density = 0;  ///< probability / area
-    };
-    struct Choice {
-        std::size_t light = 0;
-        float probability = 0;
-    };
-    void addTriangles(const Light& light);
-    Choice choose(const Receiver& receiver, float u) const;
-    float probability(const Receiver& receiver, std::size_t light) const;
-    static float importance(const Receiver& receiver, const Candidate& light);
-
-    LightSample sampleMesh(const Receiver& receiver, std::size_t light, Vec2 u) const;
-    LightSample sampleSphere(const Receiver& receiver, const Light& light, Vec2 u) const;
-
-    const Scene* scene_;
-    const std::vector<Light>& lights_;
-    std::vector<Candidate> candidates_;
-    std::vector<EmitterTriangle> triangles_;
-    std::vector<std::size_t> firstTriangle_;  ///< of each light, in triangles_
-    Distribution byPower_;
-    std::int64_t environmentLight_ = -1;
 };
 
 }  // namespace vlx::render

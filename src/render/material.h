@@ -10,8 +10,9 @@ namespace vlx::render {
 
 enum class AlphaMode : std::uint8_t { Opaque, Mask, Blend };
 
-/// A glTF material: metallic-roughness with the extensions transmission, ior, specular, clearcoat and
-/// emissive_strength. Textures multiply the factors, as the specifications say.
+/// A glTF material: metallic-roughness with the extensions transmission, ior, specular, clearcoat,
+/// emissive_strength, sheen, and volume's absorption. Textures multiply the factors, as the specifications
+/// say.
 struct Material {
     std::string name;
 
@@ -38,6 +39,13 @@ struct Material {
     float clearcoatRoughness = 0;
     TextureRef clearcoatRoughnessTexture;  ///< g
 
+    Rgb sheenColour{0, 0, 0};
+    TextureRef sheenColourTexture;
+    float sheenRoughness = 0;
+    TextureRef sheenRoughnessTexture;  ///< a
+    /// Absorption coefficient inside a transmissive solid, 1/m: light keeps exp(-absorption x distance).
+    Rgb absorption{0, 0, 0};
+
     AlphaMode alphaMode = AlphaMode::Opaque;
     float alphaCutoff = 0.5f;
     bool doubleSided = false;
@@ -50,6 +58,7 @@ struct Material {
     bool textured = false;
 
     bool emissive() const { return !isBlack(emission); }
+    bool absorbs() const { return transmissive() && !isBlack(absorption); }
     bool transmissive() const { return transmission > 0 && metallic < 1; }
     /// Seen from behind: double-sided, or a boundary of a solid that light crosses.
     bool visibleFromBehind() const { return doubleSided || transmissive(); }

@@ -1,7 +1,9 @@
 #pragma once
 
 #include "accelerator.h"
-#include "light.h"
+#include "effect_set.h"
+#include "kernel_features.h"
+#include "light_sampler.h"
 #include "sampling.h"
 #include "scene.h"
 
@@ -13,6 +15,11 @@ enum class Strategy { Mis, LightsOnly, BsdfOnly };
 struct PathOptions {
     int maxBounces = 12;  ///< scattering events at most: 0 shows only what emits, 1 direct light
     Strategy strategy = Strategy::Mis;
+    /// What is to be simulated: all that the scene calls for must be in it. All: the general tracer.
+    EffectSet effects = EffectSet::all();
+    /// What the scene calls for and is not wanted: lobes of surfaces, and caustics. The rest is the scene's
+    /// to leave out (plan.h).
+    EffectSet leftOut;
 };
 
 /// What one camera sample yields.
@@ -25,24 +32,53 @@ struct PathSample {
     Vec3 normal;    ///< shading normal there, towards the viewer; 0 on a miss
 };
 
+template <Features F>
+class BasicBsdf;
+
 /// Unidirectional path tracing with next-event estimation, multiple importance sampling by the power
 /// heuristic (Veach, "Robust Monte Carlo methods for light transport simulation", 1997) and Russian roulette
 /// by throughput. Unbiased up to `maxBounces`. Refers to scene and accelerator, which must outlive it; safe
 /// to use from many threads.
+///
+/// There are several kernels, each compiled with some features only: the smallest that has what
+/// `options.effects` asks for is used. All of them give the same bits.
 class PathTracer {
   public:
     PathTracer(const Scene& scene, const Accelerator& accelerator, const PathOptions& options);
 
-    PathSample trace(Ray ray, const PathSampler& sampler) const;
+    PathSample trace(const Ray& ray, const PathSampler& sampler) const {
+        return (this->*kernel_)(ray, sampler);
+    }
+
+    /// Of the kernel in use.
+    const Features& features() const { return features_; }
 
   private:
-    Rgb directLight(const SurfacePoint& point, const Frame& frame, const Bsdf& bsdf, const Receiver& receiver,
-                    float choice, Vec2 u, std::uint32_t seed) const;
+    using Kernel = PathSample (PathTracer::*)(Ray, const PathSampler&) const;
+    /// What a shadow ray takes over from the path's.
+    struct RayState {
+        std::uint32_t seed = 0;
+        float time = 0;
+        const Material* medium = nullptr;  ///< on the viewer's side
+        const Material* beyond = nullptr;  ///< on the other side of the surface
+    };
+
+    template <Features F>
+    PathSample traceWith(Ray ray, const PathSampler& sampler) const;
+    template <Features F>
+    Rgb directLight(const SurfacePoint& point, const Frame& frame, const BasicBsdf<F>& bsdf,
+                    const LightSampler::Local& local, float choice, Vec2 u, const RayState& state) const;
 
     const Scene& scene_;
     const Accelerator& accelerator_;
     PathOptions options_;
     LightSampler lights_;
+    Features features_;
+    Kernel kernel_;
+    bool hashesOpacity_;
+    bool choosesLights_;
+    bool absorbs_;
+    bool dropsCaustics_;
 };
 
 }  // namespace vlx::render

@@ -1,8 +1,8 @@
 #include "region_sampling.h"
 
 #include <array>
+#include <bit>
 #include <cassert>
-#include <limits>
 
 #include "sampling.h"
 
@@ -12,7 +12,8 @@ namespace {
 /// The float nearest to a raster position from below: rounding must not move a sample into the next cell.
 float rasterFloor(double position) {
     const auto f = static_cast<float>(position);
-    return f > position ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
+    // Positions are not negative: the float before a positive one has the bits before its bits.
+    return f > position ? std::bit_cast<float>(std::bit_cast<std::uint32_t>(f) - 1) : f;
 }
 
 std::uint64_t pixelSeed(std::uint64_t seed, int column, int row, int replicate) {
@@ -172,26 +173,43 @@ class RegionRefiner {
 
 }  // namespace
 
+namespace {
+
+/// The first `count` points of a pixel's randomisation.
+void samplePixel(int column, int row, int count, std::uint32_t replicate, std::uint64_t seed,
+                 const Shade& shade) {
+    CameraSample s;
+    s.column = column;
+    s.row = row;
+    s.replicate = replicate;
+    s.seed = pixelSeed(seed, column, row, static_cast<int>(replicate));
+    std::array<Vec2, 4> positions;
+    for (int i = 0; i < count; ++i) {
+        s.index = static_cast<std::uint32_t>(i);
+        if (i % 4 == 0) positions = PathSampler::ofFour(s.seed, s.index, dimension::kPixel);
+        const Vec2 u = positions[s.index % 4];
+        s.x = rasterFloor(static_cast<double>(column) + u.x);
+        s.y = rasterFloor(static_cast<double>(row) + u.y);
+        shade(s);
+    }
+}
+
+}  // namespace
+
 void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_t seed, const Shade& shade) {
     assert(replicates > 0 && spp % replicates == 0);
-    for (int row = window.y; row < window.y + window.height; ++row) {
-        for (int column = window.x; column < window.x + window.width; ++column) {
-            for (int replicate = 0; replicate < replicates; ++replicate) {
-                CameraSample s;
-                s.column = column;
-                s.row = row;
-                s.replicate = static_cast<std::uint32_t>(replicate);
-                s.seed = pixelSeed(seed, column, row, replicate);
-                for (int i = 0; i < spp / replicates; ++i) {
-                    s.index = static_cast<std::uint32_t>(i);
-                    const Vec2 u = PathSampler(s.seed, s.index).pair(dimension::kPixel);
-                    s.x = rasterFloor(static_cast<double>(column) + u.x);
-                    s.y = rasterFloor(static_cast<double>(row) + u.y);
-                    shade(s);
-                }
-            }
-        }
-    }
+    for (int row = window.y; row < window.y + window.height; ++row)
+        for (int column = window.x; column < window.x + window.width; ++column)
+            for (int replicate = 0; replicate < replicates; ++replicate)
+                samplePixel(column, row, spp / replicates, static_cast<std::uint32_t>(replicate), seed,
+                            shade);
+}
+
+void sampleCounts(const Window& window, const std::function<int(int, int)>& countAt, std::uint32_t replicate,
+                  std::uint64_t seed, const Shade& shade) {
+    for (int row = window.y; row < window.y + window.height; ++row)
+        for (int column = window.x; column < window.x + window.width; ++column)
+            samplePixel(column, row, countAt(column, row), replicate, seed, shade);
 }
 
 std::vector<int> sampleHierarchically(const Window& window, int regionX, int regionY,

@@ -30,6 +30,10 @@ inline constexpr int kRegionSize = 4;
 /// of spp / replicates each: Owen-scrambled Sobol points over the pixel.
 void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_t seed, const Shade& shade);
 
+/// As many samples in each pixel as `countAt(column, row)` says, of one randomisation, `replicate`.
+void sampleCounts(const Window& window, const std::function<int(int, int)>& countAt, std::uint32_t replicate,
+                  std::uint64_t seed, const Shade& shade);
+
 struct HierarchicalOptions {
     /// Refinement of a cell stops when its residual variance s^2 says that samples at this density give
     /// pixels a relative squared error of at most tolerance^2: mean over R, G, B of s^2 / (samples a pixel) /

@@ -7,7 +7,7 @@
 #include <ctime>
 #include <limits>
 
-#include "effects.h"
+#include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/writer.h"
 
@@ -45,29 +45,82 @@ Window clipped(int rx, int ry, const Window& window) {
     return {x0, y0, x1 - x0, y1 - y0};
 }
 
+PlanOptions planOptions(const RenderOptions& options) {
+    return {
+        options.camera, options.width, options.height, options.path.maxBounces, {.all = true, .without = {}}};
+}
+
 DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& options) {
     DumpHeader header;
     header.display = {0, 0, options.width, options.height};
     header.data = options.crop.value_or(header.display);
     header.channels = standardChannels();
-    if (options.replicates == 1) header.channels.pop_back();  // sample.replicate
+    const bool replicates =
+        options.replicates > 1 || (options.earlier != nullptr && options.earlier->hasReplicates());
+    if (!replicates) header.channels.pop_back();  // sample.replicate
     header.compression = options.compression;
     header.renderer = "vlx-trace" + (options.version.empty() ? "" : " " + options.version);
     header.scene = scene.name;
     header.pixelFilter = "box";
-    header.effects = sceneEffects(scene, scene.cameras[options.camera], options.path.maxBounces);
+    const Plan plan = options.plan ? *options.plan : planEffects(scene, planOptions(options));
+    header.effects = plan.simulated();
+    std::string leftOut;
+    for (const PlannedEffect& e : plan.effects)
+        if (plan.leftOut.has(e.effect))
+            leftOut += (leftOut.empty() ? "" : ",") + std::string(nameOf(e.effect));
+    if (!leftOut.empty()) header.extra["effectsLeftOut"] = leftOut;
     header.seed = static_cast<std::int64_t>(options.seed);
     if (!options.hierarchical) header.samples = options.spp;
+    if (options.earlier != nullptr) {
+        const double mean =
+            static_cast<double>(options.earlier->samples()) / static_cast<double>(header.data.pixels());
+        header.samples = mean + options.spp;
+    }
     header.worldToCamera = view.worldToCamera();
     header.worldToNDC = view.worldToNdc();
     return header;
 }
 
+/// A band's channels, to be written sample by sample.
+class ChannelArrays {
+  public:
+    explicit ChannelArrays(SampleBand& band) : count_(band.values.size()) {
+        for (std::size_t c = 0; c < count_; ++c) channels_[c] = band.values[c].data();
+    }
+    void put(std::uint64_t at, const Record& r) const {
+        const PathSample& s = r.sample;
+        const std::array<float, 14> values = {s.radiance.x, s.radiance.y,
+                                              s.radiance.z, s.hit ? 1.f : 0.f,
+                                              s.depth,      r.x,
+                                              r.y,          s.albedo.x,
+                                              s.albedo.y,   s.albedo.z,
+                                              s.normal.x,   s.normal.y,
+                                              s.normal.z,   static_cast<float>(r.replicate)};
+        for (std::size_t c = 0; c < count_; ++c) channels_[c][at] = values[c];
+    }
+
+  private:
+    std::array<float*, 14> channels_{};
+    std::size_t count_;
+};
+
 class BandTracer {
   public:
     BandTracer(const PathTracer& tracer, const View& view, const RenderOptions& options,
                const DumpHeader& header)
-        : tracer_(tracer), view_(view), options_(options), header_(header) {}
+        : tracer_(tracer),
+          view_(view),
+          options_(options),
+          header_(header),
+          lens_(options.path.effects.has(Effect::DepthOfField)),
+          time_(options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion})),
+          seed_(options.seed),
+          firstReplicate_(0) {
+        if (options.earlier == nullptr) return;
+        // Numbers of their own: the earlier samples may have used this seed.
+        seed_ = hashOf(options.seed, options.earlier->samples(), 0x617070u);
+        firstReplicate_ = options.earlier->freeReplicate();
+    }
 
     /// Traces the rows of `rows` (the data window's columns).
     SampleBand trace(const Window& rows, const std::function<void(std::int64_t)>& regionDone) {
@@ -76,18 +129,47 @@ class BandTracer {
         const int down = (rows.y + rows.height - 1) / kRegionSize - firstY + 1;
         regions_.resize(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
         const auto count = static_cast<std::int64_t>(regions_.size());
+        SampleBand band = bandOf(rows);
+        // Where each pixel gets as many samples, their places are known and they go there at once.
+        const bool even = !options_.hierarchical && options_.map == nullptr;
+        if (even) {
+            for (std::size_t p = 0; p <= band.pixels(); ++p)
+                band.offsets[p] = p * static_cast<std::uint64_t>(options_.spp);
+            allocate(band);
+        }
+        const ChannelArrays direct(band);
         parallelFor(0, count, [&](std::int64_t i) {
             const int rx = firstX + static_cast<int>(i % across), ry = firstY + static_cast<int>(i / across);
-            traceRegion(rx, ry, rows, regions_[static_cast<std::size_t>(i)]);
+            traceRegion(rx, ry, rows, regions_[static_cast<std::size_t>(i)], even ? &direct : nullptr);
             regionDone(1);
         });
-        return gather(rows);
+        if (!even) gather(rows, band);
+        return band;
     }
 
     const std::vector<RegionResult>& regions() const { return regions_; }
 
   private:
-    void traceRegion(int rx, int ry, const Window& rows, RegionResult& out) const {
+    SampleBand bandOf(const Window& rows) const {
+        SampleBand band;
+        band.x = rows.x;
+        band.y = rows.y;
+        band.width = rows.width;
+        band.height = rows.height;
+        band.offsets.assign(band.pixels() + 1, 0);
+        return band;
+    }
+
+    void allocate(SampleBand& band) const {
+        for (const DumpChannel& channel : header_.channels) {
+            band.channels.push_back(channel.name);
+            band.values.emplace_back(band.samples());
+        }
+    }
+
+    /// Into the region's records, or straight into the band.
+    void traceRegion(int rx, int ry, const Window& rows, RegionResult& out,
+                     const ChannelArrays* direct) const {
         out.window = clipped(rx, ry, rows);
         out.records.clear();
         out.counts.fill(0);
@@ -95,32 +177,41 @@ class BandTracer {
         const int left = rx * kRegionSize, top = ry * kRegionSize;
         const Shade shade = [&](const CameraSample& s) {
             const PathSampler sampler(s.seed, s.index);
-            const Vec2 lens = view_.hasLens() ? sampler.pair(dimension::kLens) : Vec2{};
-            PathSample sample = tracer_.trace(view_.ray(s.x, s.y, lens), sampler);
+            const Vec2 lens = lens_ ? sampler.pair(dimension::kLens) : Vec2{};
+            const float time = time_ ? sampler.pair(dimension::kTime).x : 0;
+            PathSample sample = tracer_.trace(view_.ray(s.x, s.y, lens, time), sampler);
             if (!isFinite(sample.radiance)) {
                 ++out.nonFinite;
                 sample.radiance = {};
             }
             const int pixel = (s.row - top) * kRegionSize + (s.column - left);
-            ++out.counts[static_cast<std::size_t>(pixel)];
-            out.records.push_back({pixel, s.x, s.y, s.replicate, sample});
+            const std::uint32_t number = out.counts[static_cast<std::size_t>(pixel)]++;
+            const Record record{pixel, s.x, s.y, s.replicate, sample};
+            if (direct == nullptr) {
+                out.records.push_back(record);
+            } else {
+                const std::int64_t place = std::int64_t{s.row - rows.y} * rows.width + (s.column - rows.x);
+                direct->put(static_cast<std::uint64_t>(place * options_.spp) + number, record);
+            }
             return sample.radiance;
         };
         if (options_.hierarchical) {
             out.refined = sampleHierarchically(out.window, rx, ry, options_.refinement, options_.seed, shade);
+        } else if (options_.map != nullptr) {
+            const auto countAt = [&](int x, int y) {
+                return options_.map->samplesAt(x, y, options_.spp, seed_);
+            };
+            sampleCounts(out.window, countAt, firstReplicate_, seed_, shade);
+        } else if (options_.earlier != nullptr) {
+            sampleCounts(
+                out.window, [&](int, int) { return options_.spp; }, firstReplicate_, seed_, shade);
         } else {
             sampleUniformly(out.window, options_.spp, options_.replicates, options_.seed, shade);
         }
     }
 
     /// The regions' samples in the band's order: pixel by pixel, each pixel's in the order they were taken.
-    SampleBand gather(const Window& rows) const {
-        SampleBand band;
-        band.x = rows.x;
-        band.y = rows.y;
-        band.width = rows.width;
-        band.height = rows.height;
-        band.offsets.assign(band.pixels() + 1, 0);
+    void gather(const Window& rows, SampleBand& band) const {
         const auto forPixels = [&](const RegionResult& region, auto visit) {
             const int left = floorToRegion(region.window.x), top = floorToRegion(region.window.y);
             for (int y = region.window.y; y < region.window.y + region.window.height; ++y)
@@ -134,39 +225,37 @@ class BandTracer {
                 band.offsets[pixel + 1] = region.counts[local];
             });
         for (std::size_t p = 0; p < band.pixels(); ++p) band.offsets[p + 1] += band.offsets[p];
-        for (const DumpChannel& channel : header_.channels) {
-            band.channels.push_back(channel.name);
-            band.values.emplace_back(band.samples());
-        }
+        allocate(band);
+        const ChannelArrays arrays(band);
         parallelFor(0, static_cast<std::int64_t>(regions_.size()), [&](std::int64_t i) {
             const RegionResult& region = regions_[static_cast<std::size_t>(i)];
             std::array<std::uint64_t, kRegionSize * kRegionSize> next{};
             forPixels(region,
                       [&](std::size_t local, std::size_t pixel) { next[local] = band.offsets[pixel]; });
-            for (const Record& r : region.records) {
-                const PathSample& s = r.sample;
-                const std::array<float, 14> values = {s.radiance.x, s.radiance.y,
-                                                      s.radiance.z, s.hit ? 1.f : 0.f,
-                                                      s.depth,      r.x,
-                                                      r.y,          s.albedo.x,
-                                                      s.albedo.y,   s.albedo.z,
-                                                      s.normal.x,   s.normal.y,
-                                                      s.normal.z,   static_cast<float>(r.replicate)};
-                const std::uint64_t at = next[static_cast<std::size_t>(r.pixel)]++;
-                for (std::size_t c = 0; c < band.values.size(); ++c) band.values[c][at] = values[c];
-            }
+            for (const Record& r : region.records) arrays.put(next[static_cast<std::size_t>(r.pixel)]++, r);
         });
-        return band;
     }
 
     const PathTracer& tracer_;
     const View& view_;
     const RenderOptions& options_;
     const DumpHeader& header_;
+    bool lens_;
+    bool time_;
+    std::uint64_t seed_;
+    std::uint32_t firstReplicate_;
     std::vector<RegionResult> regions_;
 };
 
 }  // namespace
+
+void RenderOptions::follow(const Plan& adopted) {
+    plan = adopted;
+    path.effects = adopted.planned;
+    path.leftOut = {};
+    for (const PlannedEffect& e : adopted.effects)
+        if (adopted.leftOut.has(e.effect) && tracerLeavesOut(e.effect)) path.leftOut.set(e.effect);
+}
 
 std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
     constexpr int kMost = 1 << 20;
@@ -189,6 +278,10 @@ std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
         return "seed must be less than 2^63";
     if (replicates < 1 || spp % replicates != 0) return "replicates must divide spp";
     if (hierarchical && replicates != 1) return "hierarchical sampling has one randomisation, not replicates";
+    if (hierarchical && (map != nullptr || earlier != nullptr))
+        return "hierarchical sampling neither follows a sample map nor adds to a dump";
+    if (replicates != 1 && (map != nullptr || earlier != nullptr))
+        return "samples of a map, or added to a dump, are one randomisation, not replicates";
     if (!(refinement.tolerance >= 0)) return "tolerance must be 0 or more";
     if (refinement.levels < 1 || refinement.levels > 5) return "levels must be 1 to 5";
     if (path.maxBounces < 0 || path.maxBounces > 1 << 16) return "max bounces must be 0 to 65536";
@@ -202,11 +295,14 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     const PathTracer tracer(scene, accelerator, options.path);
     const DumpHeader header = headerOf(scene, view, options);
     const Window& window = header.data;
+    if (options.earlier != nullptr) options.earlier->checkSameView(header);
     DumpWriter writer(path, header);
     BandTracer bands(tracer, view, options, header);
 
-    const std::int64_t mostSpp =
-        options.hierarchical ? std::int64_t{1} << (2 * (options.refinement.levels - 1)) : options.spp;
+    const std::int64_t mostSpp = options.hierarchical
+                                     ? std::int64_t{1} << (2 * (options.refinement.levels - 1))
+                                 : options.map != nullptr ? options.map->most(options.spp)
+                                                          : options.spp;
     int bandRows = kBandRows;
     while (bandRows > kRegionSize && bandRows * mostSpp * window.width > kBandSamples)
         bandRows -= kRegionSize;
@@ -235,10 +331,12 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
             for (std::size_t i = 0; i < region.refined.size(); ++i)
                 report.refinedCells[i] += static_cast<std::uint64_t>(region.refined[i]);
         }
-        writer.write(std::move(band));
+        writer.write(options.earlier != nullptr ? options.earlier->before(band) : std::move(band));
         y = end;
     }
-    writer.close(report.traceSeconds);
+    const double before =
+        options.earlier != nullptr ? options.earlier->header().renderSeconds.value_or(0) : 0;
+    writer.close(before + report.traceSeconds);
     report.writeCpuSeconds = writer.cpuSeconds();
     report.traceCpuSeconds =
         static_cast<double>(std::clock() - cpuStart) / CLOCKS_PER_SEC - report.writeCpuSeconds;

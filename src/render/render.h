@@ -4,8 +4,11 @@
 #include <optional>
 #include <string>
 
+#include "append.h"
 #include "path_tracer.h"
+#include "plan.h"
 #include "region_sampling.h"
+#include "sample_map.h"
 #include "scene.h"
 #include "variolux/base/progress.h"
 #include "variolux/base/window.h"
@@ -23,9 +26,15 @@ struct RenderOptions {
     bool hierarchical = false;   ///< METHOD.md, section 3: 1 to 256 samples a pixel as needed
     HierarchicalOptions refinement;
     std::uint64_t seed = 0;
+    const SampleMap* map = nullptr;        ///< where the samples are wanted; spp is then their mean
+    const EarlierDump* earlier = nullptr;  ///< whose samples are to be kept, before the new ones
     PathOptions path;
     DumpCompression compression = DumpCompression::Rle;
-    std::string version;  ///< of the program, for the header
+    std::string version;       ///< of the program, for the header
+    std::optional<Plan> plan;  ///< set by follow()
+
+    /// Adopts a plan, which applyPlan is to apply to the scene too.
+    void follow(const Plan& adopted);
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate(const Scene& scene) const;

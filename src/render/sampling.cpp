@@ -19,13 +19,4 @@ Distribution::Distribution(std::span<const float> weights) {
     for (std::size_t i = weights.size(); total > 0 && i-- > 0 && weights[i] == 0;) cumulative_[i] = 1.f;
 }
 
-Distribution::Sample Distribution::sample(float u) const {
-    // The last entry whose lower bound is <= u: entries of probability 0 are never taken, because the next
-    // one has the same lower bound.
-    const auto above = std::upper_bound(cumulative_.begin(), cumulative_.end() - 1, u);
-    const auto index = static_cast<std::size_t>(above - cumulative_.begin()) - 1;
-    const float p = probability(index);
-    return {index, p, std::min((u - cumulative_[index]) / p, 0x1.fffffep-1f)};
-}
-
 }  // namespace vlx::render

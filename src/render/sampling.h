@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -9,12 +11,13 @@
 
 namespace vlx::render {
 
-/// Which pair of random numbers is for what. Every use has a pair of its own in every path, whether the path
-/// uses it or not, so that leaving one effect out changes no other effect's numbers.
+/// Which pair of random numbers is for what. Pairs have names, not places in a row: a pair is computed only
+/// for an effect that is simulated, and leaving one effect out changes no other effect's numbers.
 namespace dimension {
 inline constexpr std::uint32_t kPixel = 0;
 inline constexpr std::uint32_t kLens = 1;
-inline constexpr std::uint32_t kOpacity = 2;  ///< seeds the hash of stochastic opacity
+inline constexpr std::uint32_t kOpacity = 2;         ///< seeds the hash of stochastic opacity
+inline constexpr std::uint32_t kTime = 0x80000000u;  ///< x: while the shutter is open
 inline constexpr std::uint32_t kFirstBounce = 3;
 inline constexpr std::uint32_t kPerBounce = 4;
 // Added to the bounce's first pair:
@@ -42,12 +45,75 @@ class PathSampler {
         return {unitFloat(p.x), unitFloat(p.y)};
     }
 
+    /// All pairs of a bounce, kDirection to kLightChoice, side by side: the same numbers as pair() gives.
+    std::array<Vec2, dimension::kPerBounce> bounce(int number) const {
+        Words order, x, y;
+        for (std::uint32_t i = 0; i < dimension::kPerBounce; ++i) {
+            const std::uint64_t hash = mixBits(seed_ + dimension::atBounce(number, i) * 0x9e3779b97f4a7c15u);
+            const SobolSeeds seeds = SobolSeeds::from(mixBits(hash));
+            order[i] = static_cast<std::uint32_t>(hash);
+            x[i] = seeds.x;
+            y[i] = seeds.y;
+        }
+        const Words reversed{reversedIndex_, reversedIndex_, reversedIndex_, reversedIndex_};
+        const Words index = reversedBits(scrambled(reversed, order));
+        return points(reversedBits(scrambled(index, x)), reversedBits(scrambled(secondDigits(index), y)));
+    }
+
+    /// The same pair of four samples in turn, from number `first` on.
+    static std::array<Vec2, 4> ofFour(std::uint64_t seed, std::uint32_t first, std::uint32_t dimensionPair) {
+        const std::uint64_t hash = mixBits(seed + dimensionPair * 0x9e3779b97f4a7c15u);
+        const SobolSeeds seeds = SobolSeeds::from(mixBits(hash));
+        const Words none{}, numbers = Words{0, 1, 2, 3} + first;
+        const Words index =
+            reversedBits(scrambled(reversedBits(numbers), none + static_cast<std::uint32_t>(hash)));
+        return points(reversedBits(scrambled(index, none + seeds.x)),
+                      reversedBits(scrambled(secondDigits(index), none + seeds.y)));
+    }
+
     /// A seed that belongs to this sample alone, for hashed decisions along the path.
     std::uint32_t hashSeed(std::uint32_t dimensionPair) const {
         return static_cast<std::uint32_t>(hashOf(seed_, reversedIndex_, dimensionPair));
     }
 
   private:
+    // sobol.h's functions on four words at once.
+    using Words [[gnu::vector_size(16)]] = std::uint32_t;
+    static_assert(dimension::kPerBounce == 4);
+
+    static std::array<Vec2, 4> points(Words x, Words y) {
+        x >>= 8;
+        y >>= 8;
+        std::array<Vec2, 4> pairs;
+        for (std::uint32_t i = 0; i < 4; ++i)
+            pairs[i] = {static_cast<float>(static_cast<std::int32_t>(x[i])) * 0x1p-24f,
+                        static_cast<float>(static_cast<std::int32_t>(y[i])) * 0x1p-24f};
+        return pairs;
+    }
+    static Words reversedBits(Words v) {
+        v = ((v >> 16) & 0x0000ffffu) | (v << 16);
+        v = ((v >> 8) & 0x00ff00ffu) | ((v & 0x00ff00ffu) << 8);
+        v = ((v >> 4) & 0x0f0f0f0fu) | ((v & 0x0f0f0f0fu) << 4);
+        v = ((v >> 2) & 0x33333333u) | ((v & 0x33333333u) << 2);
+        return ((v >> 1) & 0x55555555u) | ((v & 0x55555555u) << 1);
+    }
+    static Words secondDigits(Words d) {
+        d ^= (d >> 1) & 0x55555555u;
+        d ^= (d >> 2) & 0x33333333u;
+        d ^= (d >> 4) & 0x0f0f0f0fu;
+        d ^= (d >> 8) & 0x00ff00ffu;
+        d ^= (d >> 16) & 0x0000ffffu;
+        return d;
+    }
+    static Words scrambled(Words d, Words seed) {
+        d ^= d * 0x3d20adeau;
+        d += seed;
+        d *= (seed >> 16) | 1u;
+        d ^= d * 0x05526c56u;
+        d ^= d * 0x53a22864u;
+        return d;
+    }
+
     std::uint64_t seed_;
     std::uint32_t reversedIndex_;
 };
@@ -58,8 +124,12 @@ inline Vec2 toDisk(Vec2 u) {
     if (a == 0 && b == 0) return {0, 0};
     const bool wide = std::abs(a) > std::abs(b);
     const float r = wide ? a : b;
-    const float phi = wide ? (kPi / 4) * (b / a) : (kPi / 2) - (kPi / 4) * (a / b);
-    return {r * std::cos(phi), r * std::sin(phi)};
+    // Sine and cosine of an angle of at most pi / 4, from the nearer axis: Taylor's series is exact in float.
+    const float x = (kPi / 4) * (wide ? b / a : a / b), x2 = x * x;
+    const float sine =
+        x * (1 + x2 * (-1.f / 6 + x2 * (1.f / 120 + x2 * (-1.f / 5040 + x2 * (1.f / 362880)))));
+    const float cosine = 1 + x2 * (-0.5f + x2 * (1.f / 24 + x2 * (-1.f / 720 + x2 * (1.f / 40320))));
+    return wide ? Vec2{r * cosine, r * sine} : Vec2{r * sine, r * cosine};
 }
 
 /// Cosine-weighted direction about +z; density cos / pi.
@@ -110,5 +180,14 @@ class Distribution {
   private:
     std::vector<float> cumulative_;  ///< size() + 1 values from 0 to 1
 };
+
+inline Distribution::Sample Distribution::sample(float u) const {
+    // The last entry whose lower bound is <= u: entries of probability 0 are never taken, because the next
+    // one has the same lower bound.
+    const auto above = std::upper_bound(cumulative_.begin(), cumulative_.end() - 1, u);
+    const auto index = static_cast<std::size_t>(above - cumulative_.begin()) - 1;
+    const float p = probability(index);
+    return {index, p, std::min((u - cumulative_[index]) / p, 0x1.fffffep-1f)};
+}
 
 }  // namespace vlx::render

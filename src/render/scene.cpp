@@ -1,15 +1,10 @@
 #include "scene.h"
 
-#include "accelerator.h"
+#include "effect_counters.h"
+#include "surface.h"
 
 namespace vlx::render {
 namespace {
-
-/// Linear interpolation over a triangle.
-template <class T>
-T interpolated(const T& a, const T& b, const T& c, float u, float v) {
-    return a * (1 - u - v) + b * u + c * v;
-}
 
 /// The three entries of an optional vertex array.
 template <class T>
@@ -20,18 +15,75 @@ std::array<const T*, 3> corners(const std::vector<T>& array, std::int64_t first,
             base + (corner[2] - shape.firstVertex)};
 }
 
-Rgba colourAt(const Scene& scene, const Shape& shape, const std::array<std::uint32_t, 3>& corner, float u,
-              float v) {
+}  // namespace
+
+std::uint64_t Scene::triangleCount() const {
+    std::uint64_t count = 0;
+    for (std::uint32_t i = 0; i < worldShapes; ++i) count += shapes[i].triangles;
+    for (const Instance& instance : instances) {
+        const Group& group = groups[instance.group];
+        for (std::uint32_t i = 0; i < group.shapes; ++i) count += shapes[group.firstShape + i].triangles;
+    }
+    return count;
+}
+
+Rgba vertexColourAt(const Scene& scene, const Shape& shape, const std::array<std::uint32_t, 3>& corner,
+                    float u, float v) {
     const auto c = corners(scene.colours, shape.firstColour, shape, corner);
     return {interpolated(c[0]->rgb, c[1]->rgb, c[2]->rgb, u, v),
             interpolated(c[0]->a, c[1]->a, c[2]->a, u, v)};
 }
 
-/// The normal of the material's normal map in the frame of `normal`. The tangent is the vertices' own or,
-/// without one, the direction in which u grows over the triangle.
+TextureCoordinates textureCoordinates(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u,
+                                      float v) {
+    const auto& corner = scene.triangles[triangle];
+    TextureCoordinates uv;
+    uv.first = interpolated(scene.vertices[corner[0]].uv, scene.vertices[corner[1]].uv,
+                            scene.vertices[corner[2]].uv, u, v);
+    uv.second = uv.first;
+    if (shape.firstSecondUv >= 0) {
+        const auto s = corners(scene.secondUvs, shape.firstSecondUv, shape, corner);
+        uv.second = interpolated(*s[0], *s[1], *s[2], u, v);
+    }
+    return uv;
+}
+
+float opacityAt(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v) {
+    const Material& material = scene.materials[shape.material];
+    if (material.alphaMode == AlphaMode::Opaque) return 1;
+    countEffect(Effect::Alpha);
+    float opacity = material.opacity;
+    if (material.baseColourTexture) {
+        const TextureCoordinates uv = textureCoordinates(scene, shape, triangle, u, v);
+        opacity *= scene.textures[static_cast<std::size_t>(material.baseColourTexture.texture)]
+                       .lookup(uv.of(material.baseColourTexture))
+                       .a;
+    }
+    if (shape.firstColour >= 0) opacity *= vertexColourAt(scene, shape, scene.triangles[triangle], u, v).a;
+    if (material.alphaMode == AlphaMode::Mask) return opacity >= material.alphaCutoff ? 1 : 0;
+    return opacity;
+}
+
+Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v,
+                    float cosTheta) {
+    const Material& material = scene.materials[shape.material];
+    countEffect(Effect::EmissiveMeshes);
+    Rgb emission = material.emission;
+    if (material.emissionTexture) {
+        countEffect(Effect::Textures);
+        const TextureCoordinates uv = textureCoordinates(scene, shape, triangle, u, v);
+        emission *= scene.textures[static_cast<std::size_t>(material.emissionTexture.texture)]
+                        .lookup(uv.of(material.emissionTexture))
+                        .rgb;
+    }
+    if (material.clearcoat > 0) emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
+    return emission;
+}
+
 Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& material,
                   const std::array<std::uint32_t, 3>& corner, float u, float v, const TextureCoordinates& uv,
                   const Vec3& normal) {
+    countEffect(Effect::NormalMaps);
     Vec3 tangent;
     float sign = 1;
     if (shape.firstTangent >= 0) {
@@ -65,137 +117,12 @@ Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& materi
     return mappedNorm > 1e-6f ? mapped / mappedNorm : normal;
 }
 
-/// A shading normal turned just so far towards the viewer that it faces him: interpolated and mapped normals
-/// may not.
-Vec3 facing(const Vec3& normal, const Vec3& toViewer) {
-    constexpr float kLeast = 1e-3f;
-    const float cosine = dot(normal, toViewer);
-    return cosine >= kLeast ? normal : normalized(normal + toViewer * (kLeast - cosine));
-}
-
-}  // namespace
-
-std::uint64_t Scene::triangleCount() const {
-    std::uint64_t count = 0;
-    for (std::uint32_t i = 0; i < worldShapes; ++i) count += shapes[i].triangles;
-    for (const Instance& instance : instances) {
-        const Group& group = groups[instance.group];
-        for (std::uint32_t i = 0; i < group.shapes; ++i) count += shapes[group.firstShape + i].triangles;
-    }
-    return count;
-}
-
-TextureCoordinates textureCoordinates(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u,
-                                      float v) {
-    const auto& corner = scene.triangles[triangle];
-    TextureCoordinates uv;
-    uv.first = interpolated(scene.vertices[corner[0]].uv, scene.vertices[corner[1]].uv,
-                            scene.vertices[corner[2]].uv, u, v);
-    uv.second = uv.first;
-    if (shape.firstSecondUv >= 0) {
-        const auto s = corners(scene.secondUvs, shape.firstSecondUv, shape, corner);
-        uv.second = interpolated(*s[0], *s[1], *s[2], u, v);
-    }
-    return uv;
-}
-
-float opacityAt(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v) {
-    const Material& material = scene.materials[shape.material];
-    if (material.alphaMode == AlphaMode::Opaque) return 1;
-    float opacity = material.opacity;
-    if (material.baseColourTexture) {
-        const TextureCoordinates uv = textureCoordinates(scene, shape, triangle, u, v);
-        opacity *= scene.textures[static_cast<std::size_t>(material.baseColourTexture.texture)]
-                       .lookup(uv.of(material.baseColourTexture))
-                       .a;
-    }
-    if (shape.firstColour >= 0) opacity *= colourAt(scene, shape, scene.triangles[triangle], u, v).a;
-    if (material.alphaMode == AlphaMode::Mask) return opacity >= material.alphaCutoff ? 1 : 0;
-    return opacity;
-}
-
-Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v,
-                    float cosTheta) {
-    const Material& material = scene.materials[shape.material];
-    Rgb emission = material.emission;
-    if (material.emissionTexture) {
-        const TextureCoordinates uv = textureCoordinates(scene, shape, triangle, u, v);
-        emission *= scene.textures[static_cast<std::size_t>(material.emissionTexture.texture)]
-                        .lookup(uv.of(material.emissionTexture))
-                        .rgb;
-    }
-    if (material.clearcoat > 0) emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
-    return emission;
-}
-
-SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirection) {
-    const Shape& shape = scene.shapes[hit.shape];
-    SurfacePoint p;
-    p.shape = &shape;
-    p.material = &scene.materials[shape.material];
-    p.triangle = shape.firstTriangle + hit.triangle;
-    const auto& corner = scene.triangles[p.triangle];
-    const Vertex& a = scene.vertices[corner[0]];
-    const Vertex& b = scene.vertices[corner[1]];
-    const Vertex& c = scene.vertices[corner[2]];
-    const float w = 1 - hit.u - hit.v;
-
-    p.position = a.position * w + b.position * hit.u + c.position * hit.v;
-    Vec3 geometric = cross(b.position - a.position, c.position - a.position);
-    Vec3 shading = a.normal * w + b.normal * hit.u + c.normal * hit.v;
-    // Vertices without a normal, or with normals that cancel out: the triangle's own.
-    const float norm = length(shading);
-    shading = norm > 1e-6f ? shading / norm : normalized(geometric);
-    if (p.material->textured) p.uv = textureCoordinates(scene, shape, p.triangle, hit.u, hit.v);
-    if (p.material->normalTexture)
-        shading = mappedNormal(scene, shape, *p.material, corner, hit.u, hit.v, p.uv, shading);
-    if (shape.firstColour >= 0) p.colour = colourAt(scene, shape, corner, hit.u, hit.v).rgb;
-    if (hit.instance >= 0) {
-        const Transform& toWorld = scene.instances[static_cast<std::size_t>(hit.instance)].toWorld;
-        p.position = toWorld.point(p.position);
-        geometric = toWorld.normal(geometric);
-        shading = normalized(toWorld.normal(shading));
-    }
-    geometric = normalized(geometric);
-    if (dot(shading, geometric) < 0) shading = -shading;
-
-    p.fromBehind = dot(geometric, rayDirection) > 0;
-    p.geometricNormal = p.fromBehind ? -geometric : geometric;
-    p.shadingNormal = facing(p.fromBehind ? -shading : shading, -rayDirection);
-    return p;
+SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirection, float time) {
+    return surfacePoint<kEveryFeature>(scene, hit, rayDirection, time);
 }
 
 SurfaceParameters surfaceParameters(const Scene& scene, const SurfacePoint& point) {
-    const Material& m = *point.material;
-    const auto sampled = [&](const TextureRef& ref) {
-        return scene.textures[static_cast<std::size_t>(ref.texture)].lookup(point.uv.of(ref));
-    };
-    SurfaceParameters s;
-    s.baseColour = m.baseColour * point.colour;
-    s.metallic = m.metallic;
-    s.roughness = m.roughness;
-    s.transmission = m.transmission;
-    s.ior = m.ior;
-    s.specular = m.specular;
-    s.specularColour = m.specularColour;
-    s.clearcoat = m.clearcoat;
-    s.clearcoatRoughness = m.clearcoatRoughness;
-    s.albedoTable = &scene.albedoTables[static_cast<std::size_t>(m.albedoTable)];
-    if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
-    if (!m.textured) return s;
-
-    if (m.baseColourTexture) s.baseColour *= sampled(m.baseColourTexture).rgb;
-    if (m.metallicRoughnessTexture) {
-        const Rgb t = sampled(m.metallicRoughnessTexture).rgb;
-        s.roughness *= t.y;
-        s.metallic *= t.z;
-    }
-    if (m.transmissionTexture) s.transmission *= sampled(m.transmissionTexture).rgb.x;
-    if (m.specularTexture) s.specular *= sampled(m.specularTexture).a;
-    if (m.specularColourTexture) s.specularColour *= sampled(m.specularColourTexture).rgb;
-    if (m.clearcoatTexture) s.clearcoat *= sampled(m.clearcoatTexture).rgb.x;
-    if (m.clearcoatRoughnessTexture) s.clearcoatRoughness *= sampled(m.clearcoatRoughnessTexture).rgb.y;
-    return s;
+    return parametersAt<kEveryFeature>(scene, point);
 }
 
 }  // namespace vlx::render

@@ -10,6 +10,7 @@
 #include "energy_tables.h"
 #include "light.h"
 #include "material.h"
+#include "motion.h"
 #include "texture.h"
 #include "transform.h"
 #include "vec.h"
@@ -51,7 +52,8 @@ struct Group {
 
 struct Instance {
     std::uint32_t group = 0;
-    Transform toWorld;
+    Transform toWorld;         ///< in the middle of the exposure, when it moves
+    std::int32_t motion = -1;  ///< index into the scene's motions, or -1
 };
 
 /// What was met while loading that a person may want to know.
@@ -61,8 +63,8 @@ struct LoadReport {
 };
 
 /// A scene as the tracer wants it. Meshes that one node uses are stored flat in world space; meshes that
-/// several nodes use are stored once and instanced, except emissive ones, which become lights and are
-/// flattened.
+/// several nodes use, or that move, are stored once and instanced, except emissive ones that stand still,
+/// which become lights and are flattened.
 struct Scene {
     std::string name;
     std::vector<Vertex> vertices;
@@ -74,16 +76,20 @@ struct Scene {
     std::uint32_t worldShapes = 0;  ///< number of shapes that are in no group
     std::vector<Group> groups;
     std::vector<Instance> instances;
+    std::vector<Motion> motions;
 
     std::vector<Material> materials;
     std::vector<Texture> textures;
     std::vector<AlbedoTable> albedoTables;  ///< one for each index of refraction; the first is of 1.5
     std::vector<GlassTable> glassTables;
+    std::vector<SheenTable> sheenTables;  ///< one when anything has sheen
 
     std::vector<Camera> cameras;
     std::size_t activeCamera = 0;  ///< the one to use by default
     std::vector<Light> lights;
     Environment environment;
+    Shutter shutter;             ///< during which motions were followed
+    std::size_t animations = 0;  ///< in the file, whether they move anything or not
 
     Vec3 boundsMin{0, 0, 0};
     Vec3 boundsMax{0, 0, 0};
@@ -128,7 +134,8 @@ struct SurfacePoint {
 
 struct Hit;  // accelerator.h
 
-SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirection);
+/// `time`: of the ray.
+SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirection, float time = 0);
 
 /// The material there, textures applied.
 SurfaceParameters surfaceParameters(const Scene& scene, const SurfacePoint& point);

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "gltf_animation.h"
 #include "gltf_file.h"
 #include "gltf_geometry.h"
 #include "gltf_material.h"
@@ -26,19 +27,15 @@ Transform localTransform(const GltfFile& file, const tinygltf::Node& node, const
         for (std::size_t i = 0; i < 3; ++i)
             for (std::size_t j = 0; j < 4; ++j) t.m[i][j] = node.matrix[j * 4 + i];
     } else {
-        std::array<double, 4> q{0, 0, 0, 1};
-        if (node.rotation.size() == 4) std::copy(node.rotation.begin(), node.rotation.end(), q.begin());
-        const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-        if (!(norm > 0)) file.fail(what + " has a rotation that is no quaternion");
-        const double x = q[0] / norm, y = q[1] / norm, z = q[2] / norm, w = q[3] / norm;
-        t.m = {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), 0},
-                {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), 0},
-                {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), 0}}};
-        for (std::size_t i = 0; i < 3; ++i) {
-            if (node.scale.size() == 3)
-                for (std::size_t j = 0; j < 3; ++j) t.m[i][j] *= node.scale[j];
-            if (node.translation.size() == 3) t.m[i][3] = node.translation[i];
-        }
+        Pose pose;
+        if (node.rotation.size() == 4)
+            std::copy(node.rotation.begin(), node.rotation.end(), pose.rotation.begin());
+        if (node.scale.size() == 3) std::copy(node.scale.begin(), node.scale.end(), pose.scale.begin());
+        if (node.translation.size() == 3)
+            std::copy(node.translation.begin(), node.translation.end(), pose.translation.begin());
+        if (std::ranges::all_of(pose.rotation, [](double v) { return v == 0; }))
+            file.fail(what + " has a rotation that is no quaternion");
+        t = placeOf(pose);
     }
     for (const auto& row : t.m)
         for (const double v : row)
@@ -59,8 +56,15 @@ std::optional<Transform> rigid(const Transform& t) {
 
 class Loader {
   public:
-    explicit Loader(const std::string& path) : file_(path), model_(file_.model()), geometry_(file_, scene_) {
+    Loader(const std::string& path, const Shutter& shutter)
+        : file_(path),
+          model_(file_.model()),
+          geometry_(file_, scene_),
+          shutter_(shutter),
+          animations_(file_, scene_.report.warnings) {
         scene_.name = path.substr(path.find_last_of('/') + 1);
+        scene_.shutter = shutter;
+        scene_.animations = model_.animations.size();
     }
 
     Scene load(const EnvironmentOptions& environment) {
@@ -71,7 +75,9 @@ class Loader {
         if (scene_.cameras.empty()) file_.fail("has no camera");
         if (scene_.shapes.empty() && !scene_.environment) file_.fail("has no triangles and no environment");
         completeScene(scene_);
-        if (scene_.lights.empty())
+        const bool glows = std::ranges::any_of(
+            scene_.shapes, [&](const Shape& shape) { return scene_.materials[shape.material].emissive(); });
+        if (scene_.lights.empty() && !glows)
             file_.fail(
                 "has no light: neither punctual lights nor emissive surfaces nor an environment (give one "
                 "with "
@@ -82,22 +88,27 @@ class Loader {
   private:
     struct Placed {
         std::size_t node;
+        Transform toWorld;  ///< in the middle of the exposure
+        Motion motion;
+    };
+    struct Place {
         Transform toWorld;
+        Motion motion;
     };
 
     void warn(const std::string& text) { scene_.report.warnings.push_back(text); }
 
     void checkExtensions() {
         static const std::set<std::string> known = {
-            "KHR_lights_punctual",     "KHR_texture_transform",     "KHR_mesh_quantization",
-            "KHR_materials_ior",       "KHR_materials_specular",    "KHR_materials_emissive_strength",
-            "KHR_materials_clearcoat", "KHR_materials_transmission"};
+            "KHR_lights_punctual",     "KHR_texture_transform",      "KHR_mesh_quantization",
+            "KHR_materials_ior",       "KHR_materials_specular",     "KHR_materials_emissive_strength",
+            "KHR_materials_clearcoat", "KHR_materials_transmission", "KHR_materials_sheen",
+            "KHR_materials_volume"};
         for (const std::string& name : model_.extensionsRequired)
             if (!known.contains(name))
                 file_.fail("requires the extension " + name + ", which is not supported");
         for (const std::string& name : model_.extensionsUsed)
             if (!known.contains(name)) warn("the extension " + name + " is ignored");
-        if (!model_.animations.empty()) warn("animations are left at rest");
         if (!model_.skins.empty()) warn("skins are left at rest");
     }
 
@@ -106,6 +117,29 @@ class Loader {
         for (std::size_t i = 0; i < model_.materials.size(); ++i)
             scene_.materials.push_back(reader.read(model_.materials[i], i));
         scene_.materials.emplace_back();  // the specification's default material
+    }
+
+    /// A node's own transform at rest.
+    Transform localOf(std::size_t node) const {
+        return localTransform(file_, model_.nodes[node], described("node", node, model_.nodes[node].name));
+    }
+
+    /// What animates a node or one above it, or nothing.
+    std::string movesBy(std::size_t node) const {
+        for (auto n = static_cast<std::int64_t>(node); n >= 0; n = parents_[static_cast<std::size_t>(n)]) {
+            std::string cause = animations_.causeOf(static_cast<std::size_t>(n));
+            if (!cause.empty()) return cause;
+        }
+        return {};
+    }
+
+    Transform placeAt(std::size_t node, double seconds) const {
+        Transform place;
+        for (auto n = static_cast<std::int64_t>(node); n >= 0; n = parents_[static_cast<std::size_t>(n)]) {
+            const auto i = static_cast<std::size_t>(n);
+            place = (animations_.causeOf(i).empty() ? localOf(i) : animations_.local(i, seconds)) * place;
+        }
+        return place;
     }
 
     /// All nodes of the scene with their places, in the order of the file's trees.
@@ -122,11 +156,13 @@ class Loader {
         struct Pending {
             int node;
             Transform parent;
+            std::int64_t parentNode;  ///< -1: a root
         };
         std::vector<Pending> stack;
         std::vector<char> visited(model_.nodes.size(), 0);
+        parents_.assign(model_.nodes.size(), -1);
         std::vector<Placed> placed;
-        for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}});
+        for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}, -1});
         while (!stack.empty()) {
             const Pending next = stack.back();
             stack.pop_back();
@@ -137,53 +173,72 @@ class Loader {
             const tinygltf::Node& node = model_.nodes[index];
             if (visited[index]++)
                 file_.fail(described("node", index, node.name) + " has more than one parent");
-            const Transform toWorld =
-                next.parent * localTransform(file_, node, described("node", index, node.name));
-            placed.push_back({index, toWorld});
+            parents_[index] = next.parentNode;
+            const std::string cause = movesBy(index);
+            const Transform toWorld = cause.empty() ? next.parent * localOf(index)
+                                                    : placeAt(index, 0.5 * (shutter_.open + shutter_.close));
+            Motion motion;
+            if (!cause.empty() && shutter_.close > shutter_.open) {
+                motion = followed([&](double t) {
+                    return placeAt(index, shutter_.open + t * (shutter_.close - shutter_.open));
+                });
+                motion.cause = cause;
+            }
+            placed.push_back({index, toWorld, std::move(motion)});
             for (auto c = node.children.rbegin(); c != node.children.rend(); ++c)
-                stack.push_back({*c, toWorld});
+                stack.push_back({*c, toWorld, static_cast<std::int64_t>(index)});
         }
         return placed;
     }
 
     void readNodes() {
         const std::vector<Placed> placed = placedNodes();
-        std::map<std::size_t, std::vector<Transform>> uses;  // mesh -> where
+        std::map<std::size_t, std::vector<Place>> uses;  // mesh -> where
         std::vector<std::size_t> order;
-        for (const auto& [index, toWorld] : placed) {
+        for (const auto& [index, toWorld, motion] : placed) {
             const tinygltf::Node& node = model_.nodes[index];
             const std::string what = described("node", index, node.name);
-            if (node.camera >= 0) readCamera(node, toWorld, what);
-            if (const auto* light = extension(node.extensions, "KHR_lights_punctual"))
+            if (node.camera >= 0) readCamera(node, toWorld, motion, what);
+            if (const auto* light = extension(node.extensions, "KHR_lights_punctual")) {
                 readLight(static_cast<int>(number(*light, "light", -1)), node, toWorld, what);
+                if (motion.moves())
+                    warn(what + ": its light stays where it is in the middle of the exposure");
+            }
             if (node.mesh < 0) continue;
             const auto mesh = static_cast<std::size_t>(node.mesh);
             if (mesh >= model_.meshes.size())
                 file_.fail(what + " refers to mesh " + std::to_string(mesh) + ", the file has " +
                            std::to_string(model_.meshes.size()));
-            if (!usable(toWorld)) {
+            if (!usable(toWorld) || !std::ranges::all_of(motion.places, usable)) {
                 warn(what + " has a transform without an inverse: its mesh is left out");
                 continue;
             }
             if (uses[mesh].empty()) order.push_back(mesh);
-            uses[mesh].push_back(toWorld);
+            uses[mesh].push_back({toWorld, motion});
         }
         // Shapes of groups come after all others: group them at the end.
         std::vector<std::vector<Shape>> groups;
         for (const std::size_t mesh : order) {
             const auto& places = uses[mesh];
-            if (places.size() == 1 || emissive(mesh)) {
-                for (const Transform& toWorld : places) {
-                    const auto shapes = geometry_.read(mesh, toWorld);
-                    scene_.shapes.insert(scene_.shapes.end(), shapes.begin(), shapes.end());
-                }
-                continue;
+            const bool flat = places.size() == 1 || emissive(mesh);
+            for (const Place& place : places) {
+                if (!flat || place.motion.moves()) continue;
+                const auto shapes = geometry_.read(mesh, place.toWorld);
+                scene_.shapes.insert(scene_.shapes.end(), shapes.begin(), shapes.end());
             }
+            if (flat && std::ranges::none_of(places, [](const Place& p) { return p.motion.moves(); }))
+                continue;
             auto shapes = geometry_.read(mesh, {});
             if (shapes.empty()) continue;
             const auto group = static_cast<std::uint32_t>(groups.size());
             groups.push_back(std::move(shapes));
-            for (const Transform& toWorld : places) scene_.instances.push_back({group, toWorld});
+            for (const Place& place : places) {
+                if (flat && !place.motion.moves()) continue;
+                scene_.instances.push_back({group, place.toWorld, -1});
+                if (!place.motion.moves()) continue;
+                scene_.instances.back().motion = static_cast<std::int32_t>(scene_.motions.size());
+                scene_.motions.push_back(place.motion);
+            }
         }
         scene_.worldShapes = static_cast<std::uint32_t>(scene_.shapes.size());
         for (const auto& shapes : groups) {
@@ -200,7 +255,8 @@ class Loader {
         });
     }
 
-    void readCamera(const tinygltf::Node& node, const Transform& toWorld, const std::string& what) {
+    void readCamera(const tinygltf::Node& node, const Transform& toWorld, const Motion& motion,
+                    const std::string& what) {
         const auto index = static_cast<std::size_t>(node.camera);
         if (index >= model_.cameras.size())
             file_.fail(what + " refers to camera " + std::to_string(index) + ", the file has " +
@@ -212,6 +268,12 @@ class Loader {
             camera.toWorld = *place;
         } else {
             camera.unusable = "its transform has no inverse";
+        }
+        camera.motion.cause = motion.cause;
+        for (const Transform& place : motion.places) {
+            const auto rigidPlace = rigid(place);
+            if (!rigidPlace) camera.unusable = "its transform has no inverse while the shutter is open";
+            camera.motion.places.push_back(rigidPlace.value_or(place));
         }
         camera.verticalFov = static_cast<float>(source.perspective.yfov);
         camera.aspect = static_cast<float>(source.perspective.aspectRatio);
@@ -304,14 +366,17 @@ class Loader {
     const tinygltf::Model& model_;
     Scene scene_;
     GeometryReader geometry_;
+    Shutter shutter_;
+    Animations animations_;
     tinygltf::Value sceneExtras_;
     bool activeSeen_ = false;
+    std::vector<std::int64_t> parents_;  ///< of each node; -1: a root
 };
 
 }  // namespace
 
-Scene loadScene(const std::string& path, const EnvironmentOptions& environment) {
-    return Loader(path).load(environment);
+Scene loadScene(const std::string& path, const EnvironmentOptions& environment, const Shutter& shutter) {
+    return Loader(path, shutter).load(environment);
 }
 
 }  // namespace vlx::render

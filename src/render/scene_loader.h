@@ -17,15 +17,17 @@ struct EnvironmentOptions {
 /// W/m2, emissiveFactor x emissiveStrength is radiance.
 ///
 /// Extensions: KHR_lights_punctual, KHR_texture_transform, KHR_mesh_quantization, KHR_materials_
-/// emissive_strength, ior, specular, transmission, clearcoat (without its own normal map). Extras:
+/// emissive_strength, ior, specular, transmission, clearcoat (without its own normal map), sheen, volume (its
+/// absorption). Extras:
 /// cameras' `lens_radius`, `focus_distance` and `active`, punctual lights' `radius`, the scene's
-/// `env_constant`. Animations, skins and morph targets are left at rest; points and lines are left out: said
-/// in the report's warnings.
+/// `env_constant`. Animations of nodes are followed while the shutter is open; lights stay where they are in
+/// its middle, skins and morph targets at rest; points and lines are left out: said in the report's warnings.
 ///
 /// Throws Error, naming the file and what in it is wrong: not glTF; buffers missing or too short; accessors,
 /// indices or nodes out of range; vertices that are not finite; required extensions not in the list; no
 /// camera; nothing that gives light.
-Scene loadScene(const std::string& path, const EnvironmentOptions& environment = {});
+Scene loadScene(const std::string& path, const EnvironmentOptions& environment = {},
+                const Shutter& shutter = {});
 
 /// Derives what follows from a scene's geometry, materials and lights, which must be set: bounds, glass
 /// tables, mesh lights of emissive shapes, the environment's light. loadScene ends with it.

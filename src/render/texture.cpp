@@ -61,6 +61,30 @@ Rgba Texture::texel(int x, int y) const {
     return {{table[bytes_[i]], table[bytes_[i + 1]], table[bytes_[i + 2]]}, kLinearBytes[bytes_[i + 3]]};
 }
 
+std::pair<Rgba, Rgba> Texture::range() const {
+    const auto extremes = [](const auto& values) {
+        using Value = typename std::decay_t<decltype(values)>::value_type;
+        std::array<Value, 4> low{values[0], values[1], values[2], values[3]}, high = low;
+        for (std::size_t i = 4; i + 3 < values.size(); i += 4) {
+            for (std::size_t c = 0; c < 4; ++c) {
+                low[c] = std::min(low[c], values[i + c]);
+                high[c] = std::max(high[c], values[i + c]);
+            }
+        }
+        return std::pair(low, high);
+    };
+    if (!floats_.empty()) {
+        const auto [low, high] = extremes(floats_);
+        return {{{low[0], low[1], low[2]}, low[3]}, {{high[0], high[1], high[2]}, high[3]}};
+    }
+    const ByteTable& table = space_ == ColourSpace::Srgb ? kSrgbBytes : kLinearBytes;
+    const auto [low, high] = extremes(bytes_);
+    const auto decoded = [&](const std::array<std::uint8_t, 4>& c) -> Rgba {
+        return {{table[c[0]], table[c[1]], table[c[2]]}, kLinearBytes[c[3]]};
+    };
+    return {decoded(low), decoded(high)};
+}
+
 Rgba Texture::lookup(Vec2 uv) const {
     // Beyond +-2^20 repeats float coordinates carry no position; NaN goes there too.
     const auto scaled = [](float v, int size) {

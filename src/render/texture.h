@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "vec.h"
@@ -30,6 +31,9 @@ class Texture {
     /// Linear value at uv, (0, 0) being the upper left corner of the first texel. Bilinear between texel
     /// centres, decoded to linear first.
     Rgba lookup(Vec2 uv) const;
+
+    /// Least and greatest linear value of each channel: lookups lie between them.
+    std::pair<Rgba, Rgba> range() const;
 
     int width() const { return width_; }
     int height() const { return height_; }

@@ -87,6 +87,7 @@ struct Frame {
 struct Ray {
     Vec3 origin;
     Vec3 direction;  ///< unit length
+    float time = 0;  ///< from 0 when the shutter opens to 1 when it closes
 };
 
 }  // namespace vlx::render

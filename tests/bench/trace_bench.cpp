@@ -8,6 +8,7 @@
 
 #include "accelerator.h"
 #include "path_tracer.h"
+#include "plan.h"
 #include "region_sampling.h"
 #include "scene_loader.h"
 
@@ -65,9 +66,13 @@ void shoot(RTCScene scene, const std::vector<RecordedRay>& rays) {
 }
 
 void TracerAgainstBareEmbree(benchmark::State& state) {
-    const Scene scene = loadScene(VLX_TESTDATA "/scenes/interior.glb");
-    Accelerator accelerator(scene);
-    const PathTracer tracer(scene, accelerator, {});
+    Scene scene = loadScene(VLX_TESTDATA "/scenes/interior.glb");
+    const Plan plan = planEffects(scene, {scene.activeCamera, kSize, kSize, 12, {}});
+    applyPlan(scene, plan);
+    PathOptions options;
+    options.effects = plan.planned;
+    Accelerator accelerator(scene, plan.planned);
+    const PathTracer tracer(scene, accelerator, options);
     const View view(scene.cameras[scene.activeCamera], kSize, kSize);
     std::vector<RecordedRay> rays;
     accelerator.record(&rays);

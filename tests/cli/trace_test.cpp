@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "run_tool.h"
@@ -62,6 +64,17 @@ TEST(VlxTrace, BadUsageIsExitTwo) {
                                                       {kScene, "-o", out, "--crop", "1,2,3"},
                                                       {kScene, "-o", out, "--tolerance", "0.1"},
                                                       {kScene, "-o", out, "--compression", "zip"},
+                                                      {kScene, "-o", out, "--effects", "some"},
+                                                      {kScene, "-o", out, "--effects", "auto,-fog"},
+                                                      {kScene, "-o", out, "--effects"},
+                                                      {kScene, "--explain=xml"},
+                                                      {kScene, "-o", out, "--shutter", "1"},
+                                                      {kScene, "-o", out, "--shutter", "1,0"},
+                                                      {kScene, "-o", out, "--time", "0"},
+                                                      {kScene, "-o", out, "--time", "1", "--spp", "4"},
+                                                      {kScene, "-o", out, "--target-error", "-1"},
+                                                      {kScene, "-o", out, "--append"},
+                                                      {kScene, "-o", out, "--sample-map"},
                                                       {kScene, "-o", out, "--nonsense"}}) {
         const ToolRun run = trace(arguments);
         std::string line;
@@ -93,6 +106,73 @@ TEST(VlxTrace, FailuresAreExitOneNameTheFileAndLeaveNoOutput) {
     EXPECT_EQ(trace({kScene, "-o", target / "no/out.exr", "--width", "8"}).exitCode, 1);
     EXPECT_EQ(trace({kScene, "-o", target / "out.exr", "--camera", "nobody"}).exitCode, 1);
     EXPECT_EQ(target.entries(), 0);
+}
+
+TEST(VlxTrace, ExplainsWhatTheSceneCallsFor) {
+    const ToolRun run = trace({kScene, "--explain=json"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const auto j = nlohmann::json::parse(run.out);
+    ASSERT_EQ(j["effects"].size(), 20u);
+    std::map<std::string, nlohmann::json> byName;
+    for (const auto& e : j["effects"]) byName[e["name"]] = e;
+    EXPECT_TRUE(byName["clearcoat"]["planned"].get<bool>());
+    EXPECT_NE(byName["clearcoat"]["reason"].get<std::string>().find("'dark_wood'"), std::string::npos);
+    EXPECT_GE(byName["indirect"]["share"].get<double>(), 0);
+    EXPECT_FALSE(byName["depth_of_field"]["planned"].get<bool>());
+    EXPECT_FALSE(byName["depth_of_field"].contains("share"));
+
+    const ToolRun text = trace({kScene, "--explain"});
+    ASSERT_EQ(text.exitCode, 0) << text.err;
+    EXPECT_NE(text.out.find("sphere_lights      no"), std::string::npos) << text.out;
+}
+
+TEST(VlxTrace, EffectsLeftOutAreWarnedOfAndInTheHeader) {
+    const TemporaryFolder folder;
+    const ToolRun run = trace({kScene, "-o", folder / "a.exr", "--width", "8", "--spp", "1", "--effects",
+                               "auto,-caustics,-depth_of_field", "--json"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_NE(run.err.find("warning: the image is biased: caustics left out"), std::string::npos) << run.err;
+    EXPECT_EQ(run.err.find("depth_of_field left out"), std::string::npos) << run.err;
+    const DumpHeader header = DumpReader(folder / "a.exr").header();
+    EXPECT_EQ(std::ranges::count(header.effects, "caustics"), 0);
+    EXPECT_EQ(std::ranges::count(header.effects, "clearcoat"), 1);
+    EXPECT_EQ(header.extra.at("effectsLeftOut"), "caustics");
+    EXPECT_EQ(nlohmann::json::parse(run.out)["effects"], nlohmann::json(header.effects));
+}
+
+TEST(VlxTrace, TimeAndErrorChooseTheSamples) {
+    const TemporaryFolder folder;
+    const auto samples = [&](const std::string& option, const std::string& value) {
+        const ToolRun run = trace(
+            {kScene, "-o", folder / "a.exr", "--width", "8", "--json", option, value, "--replicates", "2"});
+        EXPECT_EQ(run.exitCode, 0) << run.err;
+        const auto j = nlohmann::json::parse(run.out);
+        const int spp = j["samplesPerPixel"];
+        EXPECT_EQ(spp % 2, 0);
+        EXPECT_EQ(j["samples"], spp * 64);
+        return spp;
+    };
+    EXPECT_GE(samples("--time", "0.2"), 2);
+    EXPECT_LT(samples("--target-error", "1"), samples("--target-error", "0.05"));
+}
+
+TEST(VlxTrace, AppendsToADump) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(
+        trace({kScene, "-o", folder / "a.exr", "--width", "16", "--spp", "2", "--crop", "2,3,8,6"}).exitCode,
+        0);
+    const ToolRun run = trace({kScene, "-o", folder / "b.exr", "--append", folder / "a.exr", "--spp", "3"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const DumpReader dump(folder / "b.exr");
+    EXPECT_EQ(dump.header().data, (Window{2, 3, 8, 6}));
+    EXPECT_EQ(dump.header().samples, 5);
+    EXPECT_EQ(dump.counts(3, 6), std::vector<std::uint32_t>(48, 5));
+    EXPECT_EQ(trace({kScene, "-o", folder / "a.exr", "--append", folder / "a.exr"}).exitCode, 2);
+    EXPECT_EQ(trace({kScene, "-o", folder / "c.exr", "--append", folder / "a.exr", "--width", "17"}).exitCode,
+              1);
+    EXPECT_EQ(trace({kScene, "-o", folder / "c.exr", "--append", kScene}).exitCode, 1);
+    EXPECT_EQ(trace({kScene, "-o", folder / "c.exr", "--sample-map", folder / "none.exr"}).exitCode, 1);
+    EXPECT_EQ(folder.entries(), 2);
 }
 
 }  // namespace

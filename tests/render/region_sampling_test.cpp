@@ -7,6 +7,7 @@
 #include <set>
 #include <tuple>
 
+#include "sampling.h"
 #include "variolux/base/hash.h"
 
 namespace vlx::render {
@@ -218,6 +219,20 @@ TEST(Uniform, ReplicatesAreSeparateRandomisations) {
         if (replicate > 0) {
             EXPECT_NE(positions, replicates[0]);
         }
+    }
+}
+
+TEST(PathSampler, FourAtOnceAreTheSameNumbers) {
+    for (std::uint32_t i = 0; i < 200; ++i) {
+        const std::uint64_t seed = hashOf(i);
+        const PathSampler sampler(seed, i);
+        const int number = static_cast<int>(i % 13);
+        const auto bounce = sampler.bounce(number);
+        for (std::uint32_t use = 0; use < dimension::kPerBounce; ++use)
+            EXPECT_EQ(bounce[use], sampler.pair(dimension::atBounce(number, use)));
+        const auto four = PathSampler::ofFour(seed, i, dimension::kLens);
+        for (std::uint32_t k = 0; k < 4; ++k)
+            EXPECT_EQ(four[k], PathSampler(seed, i + k).pair(dimension::kLens));
     }
 }
 

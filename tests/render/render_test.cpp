@@ -122,8 +122,9 @@ TEST(RenderDump, HeaderSaysWhatWasDone) {
     EXPECT_EQ(h.pixelFilter, "box");
     EXPECT_EQ(h.seed, 5);
     EXPECT_EQ(h.samples, 6);
-    EXPECT_EQ(h.effects, (std::vector<std::string>{"diffuse", "mirror", "transmission", "alpha",
-                                                   "emissive_meshes", "depth_of_field", "indirect"}));
+    EXPECT_EQ(h.effects,
+              (std::vector<std::string>{"diffuse", "mirror", "transmission", "alpha", "emissive_meshes",
+                                        "depth_of_field", "indirect", "caustics"}));
     ASSERT_TRUE(h.worldToCamera && h.worldToNDC && h.renderSeconds);
     EXPECT_EQ(findChannel(h, "sample.replicate"), -1);
     EXPECT_EQ(h.channels.size(), 13u);

@@ -1,0 +1,188 @@
+#include "append.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "../base/temporary_folder.h"
+#include "pilot.h"
+#include "render.h"
+#include "test_scene.h"
+#include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
+#include "variolux/base/parallel.h"
+
+namespace vlx::render {
+namespace {
+
+Scene room() {
+    TestScene t;
+    t.box(t.material(TestScene::matte({0.7f, 0.6f, 0.5f})), {-2, 0, -2}, {2, 3, 2});
+    t.quad(t.material(TestScene::emitter(Rgb(8))), {-0.5f, 2.9f, -0.5f}, {0.5f, 2.9f, -0.5f},
+           {0.5f, 2.9f, 0.5f}, {-0.5f, 2.9f, 0.5f});
+    t.camera({0, 1.2f, 1.9f}, {0, 1, 0}, 1.2f);
+    return t.finish();
+}
+
+RenderOptions small() {
+    RenderOptions options;
+    options.width = 21;
+    options.height = 18;
+    options.spp = 4;
+    return options;
+}
+
+SampleBand samplesOf(const std::string& path) {
+    const DumpReader reader(path);
+    return reader.read(reader.header().data.y, reader.header().data.height);
+}
+
+class Appending : public testing::Test {
+  protected:
+    void map(const std::function<float(int, int)>& density, const std::string& channel = "sampling.density") {
+        Image image({0, 0, 21, 18}, {channel});
+        for (int y = 0; y < 18; ++y)
+            for (int x = 0; x < 21; ++x) *image.at(x, y) = density(x, y);
+        writeImage(folder / "map.exr", image);
+    }
+    void render(const std::string& name, const RenderOptions& options) {
+        renderDump(scene, accelerator, folder / name, options);
+    }
+
+    TemporaryFolder folder;
+    Scene scene = room();
+    Accelerator accelerator{scene};
+};
+
+TEST_F(Appending, KeepsWhatWasThereAndAddsOtherSamples) {
+    render("old.exr", small());
+    const EarlierDump earlier(folder / "old.exr");
+    RenderOptions options = small();
+    options.spp = 3;
+    options.earlier = &earlier;
+    render("both.exr", options);
+    const SampleBand old = samplesOf(folder / "old.exr"), both = samplesOf(folder / "both.exr");
+    const DumpReader reader(folder / "both.exr");
+    EXPECT_EQ(reader.header().samples, 7);
+    for (std::size_t p = 0; p < old.pixels(); ++p) {
+        ASSERT_EQ(both.offsets[p + 1] - both.offsets[p], 7u);
+        for (std::size_t c = 0; c < old.values.size(); ++c)
+            for (std::size_t s = 0; s < 4; ++s)
+                ASSERT_EQ(both.values[c][both.offsets[p] + s], old.values[c][old.offsets[p] + s]);
+    }
+    // The new samples lie elsewhere, also when more are added to the sum.
+    const EarlierDump again(folder / "both.exr");
+    options.earlier = &again;
+    render("more.exr", options);
+    const SampleBand more = samplesOf(folder / "more.exr");
+    const auto x = static_cast<std::size_t>(more.channel("sample.x"));
+    for (std::size_t p = 0; p < more.pixels(); ++p) {
+        const auto begin = more.values[x].begin() + static_cast<std::ptrdiff_t>(more.offsets[p]);
+        std::vector<float> at(begin, begin + 10);
+        std::ranges::sort(at);
+        EXPECT_EQ(std::ranges::adjacent_find(at), at.end()) << p;
+    }
+}
+
+TEST_F(Appending, NewSamplesAreAReplicateOfTheirOwn) {
+    RenderOptions options = small();
+    options.replicates = 2;
+    render("old.exr", options);
+    const EarlierDump earlier(folder / "old.exr");
+    EXPECT_EQ(earlier.freeReplicate(), 2u);
+    options = small();
+    options.spp = 2;
+    options.earlier = &earlier;
+    render("both.exr", options);
+    const SampleBand both = samplesOf(folder / "both.exr");
+    const auto& r = both.values[static_cast<std::size_t>(both.channel("sample.replicate"))];
+    EXPECT_EQ(std::vector<float>(r.begin(), r.begin() + 6), (std::vector<float>{0, 0, 1, 1, 2, 2}));
+}
+
+TEST_F(Appending, AMapSaysWhereTheSamplesGo) {
+    map([](int x, int) { return x < 7 ? 0.f : x < 14 ? 1.f : 5.f; });
+    const SampleMap where(folder / "map.exr", {0, 0, 21, 18});
+    RenderOptions options = small();
+    options.spp = 5;
+    options.map = &where;
+    std::vector<SampleBand> bands;
+    for (const int threads : {1, 3}) {
+        const ThreadLimit limit(threads);
+        render("mapped.exr", options);
+        bands.push_back(samplesOf(folder / "mapped.exr"));
+        std::filesystem::remove(folder / "mapped.exr");
+    }
+    EXPECT_EQ(bands[0].offsets, bands[1].offsets);
+    EXPECT_EQ(bands[0].values, bands[1].values);
+    for (std::size_t p = 0; p < bands[0].pixels(); ++p) {
+        const double wanted = p % 21 < 7 ? 0 : p % 21 < 14 ? 2.5 : 12.5;
+        const auto n = static_cast<double>(bands[0].offsets[p + 1] - bands[0].offsets[p]);
+        EXPECT_LT(std::abs(n - wanted), 1) << p;
+    }
+    EXPECT_NEAR(static_cast<double>(bands[0].samples()), 5 * 21 * 18, 40);
+}
+
+TEST_F(Appending, BadMapsAndDumpsAreErrorsThatSayWhatWasFound) {
+    const Window whole{0, 0, 21, 18};
+    const auto message = [&](const Window& window) -> std::string {
+        try {
+            const SampleMap m(folder / "map.exr", window);
+        } catch (const Error& e) {
+            return e.what();
+        }
+        return "no error";
+    };
+    map([](int x, int) { return x == 4 ? -1.f : 1.f; });
+    EXPECT_NE(message(whole).find("column 4, row 0"), std::string::npos) << message(whole);
+    map([](int, int) { return 0.f; });
+    EXPECT_NE(message(whole).find("found none"), std::string::npos);
+    map([](int, int) { return 1.f; }, "Y");
+    EXPECT_EQ(message(whole), "no error");
+    EXPECT_NE(message({0, 0, 22, 18}).find("expected 22x18"), std::string::npos);
+    writeImage(folder / "map.exr", Image(whole, {"R", "G", "B"}));
+    EXPECT_NE(message(whole).find("found R, G, B"), std::string::npos) << message(whole);
+
+    render("old.exr", small());
+    const EarlierDump earlier(folder / "old.exr");
+    RenderOptions options = small();
+    options.earlier = &earlier;
+    options.width = 22;
+    EXPECT_THROW(render("bad.exr", options), Error);
+    options = small();
+    options.earlier = &earlier;
+    scene.cameras[0].toWorld.m[0][3] += 0.5;
+    EXPECT_THROW(render("bad.exr", options), Error);
+    EXPECT_THROW(EarlierDump(folder / "map.exr"), Error);
+    EXPECT_FALSE(std::filesystem::exists(folder / "bad.exr"));
+    options.hierarchical = true;
+    EXPECT_TRUE(options.validate(scene));
+}
+
+TEST_F(Appending, ThePilotKnowsTheErrorOfTheMean) {
+    RenderOptions options = small();
+    const PilotMeasure pilot = pilotMeasure(scene, accelerator, options, 0);
+    EXPECT_GT(pilot.secondsPerSample, 0);
+    // Two renderings of few samples differ by twice the variance of each.
+    options.spp = 2;
+    options.seed = 1;
+    render("a.exr", options);
+    options.seed = 2;
+    render("b.exr", options);
+    options.spp = 1024;
+    render("truth.exr", options);
+    const Image a = readImage(folder / "a.exr"), b = readImage(folder / "b.exr"),
+                t = readImage(folder / "truth.exr");
+    double error = 0;
+    for (int y = 0; y < 18; ++y)
+        for (int x = 0; x < 21; ++x)
+            for (const char* name : {"R", "G", "B"}) {
+                const auto at = [&](const Image& i) { return i.at(x, y)[i.channel(name)]; };
+                error += std::pow(at(a) - at(b), 2) / 2 / (at(t) * at(t) + 0.01) / (3 * 21 * 18);
+            }
+    // Of both a few bright pixels are most: they are known to a factor.
+    EXPECT_LT(error, 2.5 * pilot.relativeVariance / 2);
+    EXPECT_GT(error, 0.2 * pilot.relativeVariance / 2);
+}
+
+}  // namespace
+}  // namespace vlx::render
