@@ -14,6 +14,7 @@
 #include "variolux/reconstruct/drift_kriging.h"
 #include "variolux/reconstruct/mean.h"
 #include "variolux/reconstruct/paper.h"
+#include "variolux/reconstruct/sampling_map.h"
 
 namespace {
 
@@ -25,6 +26,7 @@ struct Options {
     Method method = Method::Krige;
     vlx::DriftKrigingOptions krige;
     std::string band;
+    std::string samplingMap;
     bool noFeatures = false;
     double sigma = 1;
     vlx::PaperOptions paper;
@@ -83,6 +85,10 @@ void bind(CLI::App& app, Options& o) {
            "krige: only band I of N, cut by rows from the top: the same pixels, bit for bit, that the "
            "whole image has there, with its display window")
         ->option_text("I/N");
+    app.add_option("--sampling-map", o.samplingMap,
+                   "Also write where more samples would lower the error most: an EXR image with channel "
+                   "sampling.density, for vlx-trace --append --sample-map (not with --method gaussian)")
+        ->option_text("IMAGE");
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
     app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
         ->check(CLI::PositiveNumber)
@@ -181,6 +187,13 @@ int run(Options& o) {
         throw CLI::ValidationError(
             "--diagnostics, --no-colour-distance and --whole-image go with --method paper");
 
+    if (!o.samplingMap.empty()) {
+        if (o.method == Method::Gaussian)
+            throw CLI::ValidationError("--sampling-map does not go with --method gaussian");
+        vlx::checkOutputName(o.samplingMap, {o.dump, o.image});
+        if (o.samplingMap == o.image)
+            throw CLI::ValidationError("--sampling-map", "expected another name than the output's");
+    }
     vlx::checkOutputName(o.image, {o.dump});
     { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
     const vlx::ThreadLimit limit(o.threads);
@@ -189,6 +202,7 @@ int run(Options& o) {
         vlx::ProgressBar bar("kriging");
         return reconstruct(o, dump, bar);
     }();
+    const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
     if (o.diagnostics) vlx::addDiagnosticLayers(result);
 
     vlx::ImageWriteOptions write;
@@ -198,6 +212,7 @@ int run(Options& o) {
     if (o.diagnostics) writeText(diagnostics.emplace(o.image + ".json"), vlx::toJson(result));
     vlx::writeImage(o.image, result.image, write);
     if (diagnostics) diagnostics->commit();
+    if (!o.samplingMap.empty()) vlx::writeImage(o.samplingMap, map, write);
 
     if (o.json)
         std::printf("%s\n", vlx::toJson(result.report).c_str());

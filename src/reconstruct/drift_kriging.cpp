@@ -24,6 +24,8 @@ constexpr double kMeanSignificance = 1;  // standard errors by which the plain m
 // Rows kept of everything: a tile row, and all that its stages look ahead and back, rounded up.
 constexpr int kRowsKept = 192;
 
+constexpr std::pair<int, int> kNeighbours[] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
+
 /// The last one is the small one, which the first is shrunk towards.
 std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
     switch (quality) {
@@ -215,13 +217,12 @@ class Pipeline {
         const auto raw = [&](int plane) { return gathered_.row(plane, y)[x]; };
         const float nA = raw(planes_.countA), nB = raw(planes_.countB);
         const float n = raw(planes_.count);
-        const bool single = n == 1;
         data_.row(2 * radiance_ + 2, y)[x] = n;
         data_.row(2 * radiance_, y)[x] = nA;
         data_.row(2 * radiance_ + 1, y)[x] = nB;
         for (int c = 0; c < radiance_; ++c) {
-            data_.row(c, y)[x] = raw(planes_.meanA + c);
-            data_.row(radiance_ + c, y)[x] = raw(planes_.meanB + c);
+            data_.row(c, y)[x] = halfMean(planes_.countA, planes_.meanA + c, x, y);
+            data_.row(radiance_ + c, y)[x] = halfMean(planes_.countB, planes_.meanB + c, x, y);
         }
         float squares[3];
         for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares + c);
@@ -242,17 +243,32 @@ class Pipeline {
                         squares[c] =
                             std::max(0.f, squares[c] + step * (2 * old + step - 2 * mean) - step * step / n);
                     }
-                    if (half == 0 || single) data_.row(c, y)[x] += step / halfCount;
-                    if (half == 1 || single) data_.row(radiance_ + c, y)[x] += step / halfCount;
+                    data_.row(half * radiance_ + c, y)[x] += step / halfCount;
                 }
                 ++samples;
                 luminance += static_cast<double>(brightest - most);
             }
         }
-        float freedom = std::max(0.f, n - 1);
-        if (n == 1) borrowSquares(x, y, squares, freedom);
+        float freedom = raw(planes_.freedom);
+        if (n == 1 && freedom == 0) borrowSquares(x, y, squares, freedom);
         for (int c = 0; c < 3; ++c) squares_.row(c, y)[x] = squares[c];
         squares_.row(3, y)[x] = freedom;
+    }
+
+    /// Mean of a half. Where a pixel has no sample of it, what its neighbours have on average stands in, with
+    /// count 0: no datum, but something for patches to be alike to.
+    float halfMean(int count, int mean, int x, int y) const {
+        const float own = gathered_.row(mean, y)[x];
+        if (gathered_.row(count, y)[x] > 0 || gathered_.row(planes_.count, y)[x] == 0) return own;
+        float sum = 0;
+        int found = 0;
+        for (const auto& [dx, dy] : kNeighbours) {
+            if (x + dx < 0 || x + dx >= width_ || y + dy < 0 || y + dy >= height_) continue;
+            if (gathered_.row(count, y + dy)[x + dx] == 0) continue;
+            sum += gathered_.row(mean, y + dy)[x + dx];
+            ++found;
+        }
+        return found > 0 ? sum / static_cast<float>(found) : own;
     }
 
     /// The second largest luminance of a sample within kFireflyReach.
@@ -279,13 +295,16 @@ class Pipeline {
         constexpr float kFreedom = 1e-3f;
         float sum[3] = {};
         int pairs = 0;
-        for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+        const auto mean = [&](int c, int col, int row) {
+            const bool inA = gathered_.row(planes_.countA, row)[col] > 0;
+            return gathered_.row((inA ? planes_.meanA : planes_.meanB) + c, row)[col];
+        };
+        for (const auto& [dx, dy] : kNeighbours) {
             if (x + dx < 0 || x + dx >= width_ || y + dy < 0 || y + dy >= height_) continue;
-            if (gathered_.row(planes_.countA, y + dy)[x + dx] == 0) continue;
+            if (gathered_.row(planes_.count, y + dy)[x + dx] == 0) continue;
             ++pairs;
             for (int c = 0; c < 3; ++c) {
-                const float d =
-                    gathered_.row(planes_.meanA + c, y)[x] - gathered_.row(planes_.meanA + c, y + dy)[x + dx];
+                const float d = mean(c, x, y) - mean(c, x + dx, y + dy);
                 sum[c] += 0.5f * d * d;
             }
         }
@@ -447,14 +466,16 @@ class Pipeline {
         for (int x = 0; x < width_; ++x) {
             std::fill(sums.begin(), sums.end(), 0.0);
             std::fill(squares.begin(), squares.end(), 0.0);
-            const bool usable = data_.row(2 * radiance_, y)[x] > 0 && data_.row(2 * radiance_ + 1, y)[x] > 0;
             const double unit = 1 / halfVariance(x, y);
-            for (int c = 0; usable && c < 3; ++c)
+            for (int c = 0; c < 3; ++c)
                 for (int half = 0; half < 2; ++half) {
+                    // What is predicted is the other half's mean; one's own may be missing (a single sample).
+                    if (data_.row(2 * radiance_ + 1 - half, y)[x] == 0) continue;
                     const double base = estimate(0, half, c, x, y);
                     const double other = data_.row((1 - half) * radiance_ + c, y)[x] - base;
                     for (int j = 1; j <= m; ++j)
                         e[static_cast<std::size_t>(j)] = estimate(j, half, c, x, y) - base;
+                    if (data_.row(2 * radiance_ + half, y)[x] == 0) e.back() = 0;
                     std::size_t at = 0;
                     for (int i = 1; i <= m; ++i)
                         for (int j = 1; j <= i; ++j)

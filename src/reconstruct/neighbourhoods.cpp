@@ -202,8 +202,7 @@ class Tile {
             for (const int dx : {-left, model.stride - left}) {
                 if (x_ + col + dx >= in_.width || y_ + row + dy >= in_.height) continue;
                 const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
-                if (counts_[half][there] > 0 &&
-                    nearExp(compositeDistance(model, half, col, row, dx, dy)) > kCoveringWeight &&
+                if (nearExp(compositeDistance(model, half, col, row, dx, dy)) > kCoveringWeight &&
                     errors_[half][here] >= kCoveringVariance * errors_[half][there])
                     return true;
             }

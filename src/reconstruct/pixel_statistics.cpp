@@ -64,6 +64,29 @@ float luminance(const double* rgb) {
     return static_cast<float>(std::max(0.0, 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]));
 }
 
+/// Whether every sample says how uncertain it is.
+bool varianceKnown(const SampleBand& band, const SampleLayout& layout,
+                   const std::vector<std::size_t>& samples) {
+    if (layout.variance < 0 || samples.empty()) return false;
+    for (std::size_t c = 0; c < 3; ++c)
+        for (const std::size_t s : samples) {
+            const float v = band.values[static_cast<std::size_t>(layout.variance) + c][s];
+            if (!(v >= 0 && std::isfinite(v))) return false;
+        }
+    return true;
+}
+
+/// The sum of squares that as many samples with the same error of their mean would have: the mean of samples
+/// with error variances v has sum v / n^2; that is S / (n (n - 1)), with S / 1 for one sample.
+double knownSquares(const SampleBand& band, const SampleLayout& layout,
+                    const std::vector<std::size_t>& samples, std::size_t c) {
+    double sum = 0;
+    for (const std::size_t s : samples)
+        sum += static_cast<double>(band.values[static_cast<std::size_t>(layout.variance) + c][s]);
+    const auto n = static_cast<double>(samples.size());
+    return sum / n * std::max(1.0, n - 1);
+}
+
 }  // namespace
 
 SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOptions& options) {
@@ -94,6 +117,12 @@ SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOption
         layout.replicate = static_cast<int>(layout.names.size());
         layout.names.emplace_back("sample.replicate");
     }
+    if (std::all_of(
+            std::begin(kVarianceChannels), std::end(kVarianceChannels),
+            [&](std::string_view channel) { return findChannel(header, std::string(channel)) >= 0; })) {
+        layout.variance = static_cast<int>(layout.names.size());
+        layout.names.insert(layout.names.end(), std::begin(kVarianceChannels), std::end(kVarianceChannels));
+    }
     return layout;
 }
 
@@ -111,6 +140,7 @@ GatheredPlanes::GatheredPlanes(const SampleLayout& layout)
     meanA = take(radiance);
     meanB = take(radiance);
     squares = take(3);
+    freedom = take(1);
     feature = take(features);
     featureError = take(features);
     brightest = take(radiance);
@@ -156,7 +186,10 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
             std::sort(order.begin(), order.end());
             halves[0].clear();
             halves[1].clear();
-            for (std::size_t i = 0; i < order.size(); ++i) halves[i % 2].push_back(order[i].second);
+            // Single samples go to the halves by turns, as the fields of a chessboard do.
+            const std::size_t startHalf = usable.size() == 1 ? static_cast<std::size_t>(x + y) % 2 : 0;
+            for (std::size_t i = 0; i < order.size(); ++i)
+                halves[(startHalf + i) % 2].push_back(order[i].second);
         }
         const auto n = static_cast<double>(usable.size());
         if (usable.empty()) ++counts.empty;
@@ -197,21 +230,23 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
                 }
             }
 
+        const bool known = varianceKnown(band, layout, usable);
         const auto put = [&](int plane, double v) { ring.row(plane, y)[x] = static_cast<float>(v); };
         const auto nA = static_cast<double>(halves[0].size());
         const auto nB = static_cast<double>(halves[1].size());
-        const bool single = usable.size() == 1;
         put(planes.count, n);
         put(planes.countA, nA);
-        put(planes.countB, single ? nA : nB);
+        put(planes.countB, nB);
+        put(planes.freedom, known ? std::max(1.0, n - 1) : std::max(0.0, n - 1));
         for (std::size_t c = 0; c < radiance; ++c) {
             const double a = nA > 0 ? first[c] + sum[0][c] / nA : 0;
             put(planes.meanA + static_cast<int>(c), a);
-            put(planes.meanB + static_cast<int>(c), single ? a : nB > 0 ? first[c] + sum[1][c] / nB : 0);
+            put(planes.meanB + static_cast<int>(c), nB > 0 ? first[c] + sum[1][c] / nB : 0);
         }
         for (std::size_t c = 0; c < radiance + features; ++c) {
             const double total = sum[0][c] + sum[1][c];
-            const double squares = n > 0 ? std::max(0.0, square[c] - total * total / n) : 0;
+            double squares = n > 0 ? std::max(0.0, square[c] - total * total / n) : 0;
+            if (c < 3 && known) squares = knownSquares(band, layout, usable, c);
             if (c < 3) put(planes.squares + static_cast<int>(c), squares);
             if (c < radiance) continue;
             const double scale = layout.scale[c - radiance];

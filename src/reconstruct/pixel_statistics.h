@@ -23,6 +23,7 @@ struct SampleLayout {
     std::vector<float> scale;        ///< of each feature: what is stored is feature / scale
     int groups = 0;
     int replicate = -1;  ///< index in `names`
+    int variance = -1;   ///< index in `names` of the first of kVarianceChannels, all three of which are there
 };
 
 /// Finds the roles. Albedo and normals are of order 1 by definition; the scale of depth and of named features
@@ -38,9 +39,10 @@ struct GatheredPlanes {
     int radiance, features;
     // Indices of planes.
     int count;                  ///< usable samples
-    int countA, countB;         ///< of each half; a single sample counts in both
+    int countA, countB;         ///< of each half
     int meanA, meanB;           ///< radiance channels: mean of each half (0 where it has no sample)
     int squares;                ///< 3: sum of squared deviations of R, G, B from the pixel's mean
+    int freedom;                ///< degrees of freedom of `squares`
     int feature, featureError;  ///< mean of each feature, and the error variance of that mean
     int brightest;              ///< radiance channels of the brightest sample
     int brightestLuminance, secondLuminance, brightestHalf;
@@ -57,9 +59,11 @@ struct GatherCounts {
 ///
 /// Halves A and B are the replicates of even and odd number where the dump has replicates, else a random half
 /// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
-/// alike, and may lie on different sides of the pixel. A pixel with one sample has it in both halves. A
-/// sample with a non-finite R, G or B is dropped; other non-finite values count as 0. Sums run in double
-/// precision about the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
+/// alike, and may lie on different sides of the pixel. A single sample belongs to A or B as its pixel is a
+/// black or a white field of a chessboard. Samples with known error variances (kVarianceChannels) stand for
+/// their own scatter. A sample with a non-finite R, G or B is dropped; other non-finite values count as 0.
+/// Sums run in double precision about the pixel's first sample. A `clamp` above 0 limits the luminance of
+/// each sample.
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
                        int bandRow, double clamp, RowRing& ring, int y);
 

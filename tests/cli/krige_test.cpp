@@ -96,6 +96,23 @@ TEST(VlxKrige, InspectedRegionsHaveTheirVariogram) {
                           looked.at(col, row)[looked.channel(channel)]);
 }
 
+TEST(VlxKrige, BandsAndTheMapOfSamples) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(krige({kDump, "-o", folder / "whole.exr", "--sampling-map", folder / "map.exr", "-q"}).exitCode,
+              0);
+    ASSERT_EQ(krige({kDump, "-o", folder / "band.exr", "--band", "2/3", "-q"}).exitCode, 0);
+    const Image whole = readImage(folder / "whole.exr"), band = readImage(folder / "band.exr"),
+                map = readImage(folder / "map.exr");
+    ASSERT_EQ(band.channels, whole.channels);
+    const int first = band.data.y - whole.data.y;
+    EXPECT_EQ(first, whole.data.height / 3);
+    for (int row = 0; row < band.data.height; ++row)
+        EXPECT_TRUE(std::equal(band.at(0, row), band.at(0, row) + band.data.width * band.channelCount(),
+                               whole.at(0, first + row)));
+    EXPECT_EQ(map.data, whole.data);
+    EXPECT_EQ(map.channels, std::vector<std::string>{"sampling.density"});
+}
+
 TEST(VlxKrige, BadUsageIsExitTwo) {
     const TemporaryFolder folder;
     const std::string out = folder / "out.exr";

@@ -324,6 +324,42 @@ TEST_F(DriftKriging, StrengthMixesWithTheMean) {
             }
 }
 
+TEST_F(DriftKriging, OneSampleAPixelIsEnough) {
+    Picture picture;
+    picture.spp = 1;
+    write(picture.samples());
+    for (const Quality quality : {Quality::Draft, Quality::Standard}) {
+        const Image image = krige({.quality = quality}).image;
+        EXPECT_LT(picture.error(image), 0.03);  // of 0.25, the sample's
+        double sum = 0;
+        for (int row = 0; row < image.data.height; ++row)
+            for (int col = 0; col < image.data.width; ++col)
+                sum += static_cast<double>(image.at(col, row)[image.channel("stddev.R")]);
+        EXPECT_GT(sum, 0);
+    }
+}
+
+TEST_F(DriftKriging, KnownErrorVariancesStandForTheScatter) {
+    Picture picture;
+    picture.spp = 1;
+    picture.truth = [](int, int) { return 2.0; };
+    picture.albedo = [](int, int) { return 0.5; };
+    SampleBand band = picture.samples();
+    for (const char* channel : {"variance.R", "variance.G", "variance.B"}) {
+        band.channels.emplace_back(channel);
+        band.values.emplace_back(band.values[0].size(), 0.09f);
+    }
+    write(band);
+    const Image image = krige({.strength = 0}).image;
+    for (const int channel : {image.channel("stddev.R"), image.channel("stddev.B")})
+        EXPECT_NEAR(image.at(30, 30)[channel], 0.3, 1e-3);
+    // Where one is not known, scatter counts again: the truth is 2 with a standard deviation of 1.
+    band.values.back().assign(band.values[0].size(), -1.f);
+    write(band);
+    const Image scattered = krige({.strength = 0}).image;
+    EXPECT_NEAR(scattered.at(30, 30)[scattered.channel("stddev.R")], 1, 0.3);
+}
+
 TEST_F(DriftKriging, FewestAndOddestSamples) {
     // One sample a pixel; one pixel; one column; black; huge; tiny: finite, and not negative.
     for (const auto& [window, spp, scale] : {std::tuple{Window{0, 0, 40, 40}, 1, 1.0},
@@ -336,6 +372,7 @@ TEST_F(DriftKriging, FewestAndOddestSamples) {
         picture.window = window;
         picture.spp = spp;
         picture.truth = [scale = scale](int x, int) { return scale * (x > 15 ? 1 : 0.1); };
+        picture.albedo = [](int x, int) { return x > 15 ? 0.8 : 0.1; };
         picture.noise = 0.3;
         write(picture.samples());
         for (const Quality quality : {Quality::Draft, Quality::Standard, Quality::High}) {
