@@ -14,6 +14,7 @@
 #include "variolux/reconstruct/drift_kriging.h"
 #include "variolux/reconstruct/mean.h"
 #include "variolux/reconstruct/paper.h"
+#include "variolux/reconstruct/pixel_filter.h"
 #include "variolux/reconstruct/sampling_map.h"
 
 namespace {
@@ -25,6 +26,7 @@ struct Options {
     std::string image;
     Method method = Method::Krige;
     vlx::DriftKrigingOptions krige;
+    vlx::PixelFilter filter = vlx::PixelFilter::Box;
     std::string band;
     std::string samplingMap;
     bool noFeatures = false;
@@ -80,6 +82,17 @@ void bind(CLI::App& app, Options& o) {
         "--radiance", o.krige.radiance,
         "krige: a further channel to estimate with the same weights as R, G, B (a light group): parts "
         "still add up; repeatable");
+    app.add_option("--scale", o.krige.scale,
+                   "krige: pixels of the image along each axis for one of the dump; needs sample positions")
+        ->check(CLI::Range(1, 4))
+        ->capture_default_str();
+    vlx::addChoice(
+        app, "--filter", o.filter,
+        {{"box", vlx::PixelFilter::Box},
+         {"gaussian", vlx::PixelFilter::Gaussian},
+         {"blackman-harris", vlx::PixelFilter::BlackmanHarris}},
+        "krige: pixel filter of the result. box: averages over pixels; gaussian: standard deviation "
+        "0.5, radius 1.5; blackman-harris: radius 1.5 pixels");
     app.add_option(
            "--band", o.band,
            "krige: only band I of N, cut by rows from the top: the same pixels, bit for bit, that the "
@@ -128,8 +141,11 @@ void bind(CLI::App& app, Options& o) {
 vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
                                 const vlx::Progress& progress) {
     switch (o.method) {
-        case Method::Krige:
-            return vlx::reconstructDriftKriging(dump, o.krige, progress);
+        case Method::Krige: {
+            vlx::Reconstruction result = vlx::reconstructDriftKriging(dump, o.krige, progress);
+            result.image = vlx::applyPixelFilter(result.image, o.filter);
+            return result;
+        }
         case Method::Paper:
             return vlx::reconstructPaper(dump, o.paper, progress);
         case Method::Mean:
@@ -180,7 +196,11 @@ int run(Options& o) {
     if (!o.band.empty()) {
         if (o.method != Method::Krige) throw CLI::ValidationError("--band goes with --method krige");
         o.krige.band = parseBand(o.band);
+        if (o.filter != vlx::PixelFilter::Box)  // it reaches into the bands beside
+            throw CLI::ValidationError("--band goes with --filter box");
     }
+    if (o.method != Method::Krige && (o.filter != vlx::PixelFilter::Box || o.krige.scale != 1))
+        throw CLI::ValidationError("--filter and --scale go with --method krige");
     if (!o.inspect.empty() && !o.diagnostics) throw CLI::ValidationError("--inspect goes with --diagnostics");
     for (const std::string& text : o.inspect) o.paper.inspect.push_back(parsePixel(text));
     if (o.method != Method::Paper && (o.diagnostics || o.noColourDistance || o.wholeImage))

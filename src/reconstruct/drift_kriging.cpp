@@ -7,6 +7,7 @@
 #include "neighbourhoods.h"
 #include "pixel_statistics.h"
 #include "prefilter.h"
+#include "rebin.h"
 #include "stacking.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
@@ -68,8 +69,8 @@ class Pipeline {
           layout_(chooseSampleLayout(dump, options)),
           planes_(layout_),
           models_(modelsOf(options.quality)),
-          width_(dump.header().data.width),
-          height_(dump.header().data.height),
+          width_(dump.header().data.width * options.scale),
+          height_(dump.header().data.height * options.scale),
           radiance_(layout_.radiance),
           gathered_(width_, planes_.channels, kRowsKept),
           data_(width_, 2 * radiance_ + 3, kRowsKept),
@@ -91,7 +92,7 @@ class Pipeline {
         moments_ = RowRing(width_, momentPlanes_, kRowsKept);
         std::vector<std::string> channels(layout_.names.begin(), layout_.names.begin() + radiance_);
         for (const char* name : {"stddev.R", "stddev.G", "stddev.B"}) channels.emplace_back(name);
-        Window window = dump.header().data;
+        Window window = scaled(dump.header().data);
         firstRow_ = bandRow(options.band, window.height);
         endRow_ = bandRow({options.band.index + 1, options.band.count}, window.height);
         window.y += firstRow_;
@@ -101,7 +102,7 @@ class Pipeline {
                                          std::to_string(height_) + " rows and " +
                                          std::to_string(options.band.count) + " bands");
         result_.image = Image(window, std::move(channels));
-        result_.image.display = dump.header().display;
+        result_.image.display = scaled(dump.header().display);
         startAbove(firstRow_);
     }
 
@@ -128,7 +129,12 @@ class Pipeline {
         varianceRows_ = std::max(0, krigedRows_ - kTileMargin);
         featureRows_ = tileAbove(varianceRows_ - kVarianceReach);
         dataRows_ = std::max(0, featureRows_ - kTileMargin);
-        gatheredRows_ = std::max(0, dataRows_ - kHoleReach);
+        gatheredRows_ = std::max(0, dataRows_ - kHoleReach) / options_.scale * options_.scale;
+    }
+
+    Window scaled(const Window& window) const {
+        const int s = options_.scale;
+        return {window.x * s, window.y * s, window.width * s, window.height * s};
     }
 
     bool own(int y) const { return y >= firstRow_ && y < endRow_; }
@@ -138,8 +144,14 @@ class Pipeline {
     void gather(int until) {
         until = std::min(until, height_);
         while (gatheredRows_ < until) {
-            const int first = gatheredRows_, rows = std::min(kReadRows, height_ - first);
-            const SampleBand band = dump_.read(dump_.header().data.y + first, rows, layout_.names);
+            const int scale = options_.scale, first = gatheredRows_;
+            const int sourceRows = std::min(kReadRows / scale, (height_ - first) / scale);
+            const int rows = sourceRows * scale;
+            SampleBand band = dump_.read(dump_.header().data.y + first / scale, sourceRows, layout_.names);
+            if (scale > 1) {
+                const auto position = static_cast<std::size_t>(layout_.position);
+                band = rebin(band, scale, position, position + 1);
+            }
             watch_.addTo(result_.report.seconds["read"]);
             std::vector<GatherCounts> counts(static_cast<std::size_t>(rows));
             const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;
@@ -637,6 +649,7 @@ class Pipeline {
 std::optional<std::string> DriftKrigingOptions::validate() const {
     if (!(strength >= 0 && strength <= 1))
         return "expected a strength of 0 to 1, found " + std::to_string(strength);
+    if (scale < 1 || scale > 4) return "expected a scale of 1 to 4, found " + std::to_string(scale);
     if (band.count < 1 || band.index < 0 || band.index >= band.count)
         return "expected a band from 1 to " + std::to_string(band.count) + ", found " +
                std::to_string(band.index + 1);

@@ -117,6 +117,11 @@ SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOption
         layout.replicate = static_cast<int>(layout.names.size());
         layout.names.emplace_back("sample.replicate");
     }
+    if (options.scale > 1) {
+        for (const char* channel : {"sample.x", "sample.y"}) requireChannel(dump, layout, channel);
+        layout.position = static_cast<int>(layout.names.size());
+        layout.names.insert(layout.names.end(), {"sample.x", "sample.y"});
+    }
     if (std::all_of(
             std::begin(kVarianceChannels), std::end(kVarianceChannels),
             [&](std::string_view channel) { return findChannel(header, std::string(channel)) >= 0; })) {

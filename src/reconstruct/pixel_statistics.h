@@ -23,6 +23,7 @@ struct SampleLayout {
     std::vector<float> scale;        ///< of each feature: what is stored is feature / scale
     int groups = 0;
     int replicate = -1;  ///< index in `names`
+    int position = -1;   ///< index in `names` of sample.x, sample.y after it; where they are needed
     int variance = -1;   ///< index in `names` of the first of kVarianceChannels, all three of which are there
 };
 

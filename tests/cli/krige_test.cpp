@@ -109,6 +109,12 @@ TEST(VlxKrige, BandsAndTheMapOfSamples) {
     for (int row = 0; row < band.data.height; ++row)
         EXPECT_TRUE(std::equal(band.at(0, row), band.at(0, row) + band.data.width * band.channelCount(),
                                whole.at(0, first + row)));
+    for (const char* filter : {"box", "gaussian", "blackman-harris"})
+        EXPECT_EQ(krige({kDump, "-o", folder / "filtered.exr", "--filter", filter, "-q"}).exitCode, 0)
+            << filter;
+    const ToolRun doubled = krige({kDump, "-o", folder / "doubled.exr", "--scale", "2", "-q"});
+    ASSERT_EQ(doubled.exitCode, 0) << doubled.err;
+    EXPECT_EQ(readImage(folder / "doubled.exr").data.width, 2 * whole.data.width);
     EXPECT_EQ(map.data, whole.data);
     EXPECT_EQ(map.channels, std::vector<std::string>{"sampling.density"});
 }

@@ -324,6 +324,44 @@ TEST_F(DriftKriging, StrengthMixesWithTheMean) {
             }
 }
 
+TEST_F(DriftKriging, ScaleShowsWhatLiesWithinPixels) {
+    // An edge through the middle of pixels: sub-pixels left and right of it differ, pixels cannot tell.
+    Picture picture;
+    picture.window = {0, 0, 40, 36};
+    picture.noise = 0.2;
+    picture.spp = 16;
+    SampleBand band = picture.samples();
+    band.channels.insert(band.channels.end(), {"sample.x", "sample.y"});
+    band.values.resize(band.channels.size(), std::vector<float>(band.samples()));
+    for (std::size_t p = 0; p + 1 < band.offsets.size(); ++p)
+        for (std::size_t s = band.offsets[p]; s < band.offsets[p + 1]; ++s) {
+            const auto i = static_cast<int>(s - band.offsets[p]);
+            const float x =
+                static_cast<float>(static_cast<int>(p) % 40) + (static_cast<float>(i % 4) + 0.5f) / 4;
+            const float y =
+                static_cast<float>(static_cast<int>(p) / 40) + (static_cast<float>(i / 4) + 0.5f) / 4;
+            const float bright = x > 20.5f ? 2 : 1;
+            for (std::size_t c = 0; c < 3; ++c)
+                band.values[c][s] = bright * (1 + 0.1f * std::sin(31.f * static_cast<float>(s)));
+            for (std::size_t c = 3; c < 6; ++c) band.values[c][s] = 0.4f * bright;
+            band.values[6][s] = x;
+            band.values[7][s] = y;
+        }
+    write(band);
+    const Reconstruction whole = krige({.scale = 2});
+    EXPECT_EQ(whole.image.data, (Window{0, 0, 80, 72}));
+    EXPECT_EQ(whole.report.samples, 40 * 36 * 16);
+    for (int row = 10; row < 60; ++row) {
+        EXPECT_NEAR(whole.image.at(40, row)[0], 1, 0.1) << row;
+        EXPECT_NEAR(whole.image.at(41, row)[0], 2, 0.2) << row;
+    }
+    const Image band2 = krige({.scale = 2, .band = {1, 3}}).image;
+    EXPECT_TRUE(std::equal(band2.pixels.begin(), band2.pixels.end(), whole.image.at(0, 24)));
+    write(picture.samples());
+    EXPECT_THROW(krige({.scale = 2}), Error);  // no positions
+    EXPECT_TRUE(DriftKrigingOptions{.scale = 5}.validate());
+}
+
 TEST_F(DriftKriging, OneSampleAPixelIsEnough) {
     Picture picture;
     picture.spp = 1;

@@ -74,17 +74,21 @@ struct DriftKrigingOptions {
     std::vector<std::string> radiance =
         {};  ///< further channels to estimate with the same weights (light groups)
 
+    int scale = 1;   ///< 1 to 4: pixels of the image along each axis for one of the dump
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
 };
 
+/// With a scale above 1 the samples are sorted into parts of their pixels by their positions, and parts
+/// without samples are predicted; the windows grow by the scale.
+///
 /// Reads the dump once, in bands; memory depends on its width, not its height. Bit-identical for any number
 /// of threads. Every channel gets the same weights: parts that add up to R, G, B still do. Channels of the
 /// image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without samples is
 /// predicted from its neighbours and counted. Throws as DumpReader; Error when options are invalid, name
-/// channels that the dump lacks or more bands than it has rows.
+/// channels that the dump lacks, ask for a scale where it has no positions or for more bands than rows.
 Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
                                        const Progress& progress = {});
 

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstddef>
+
+#include "variolux/dump/band.h"
+
+namespace vlx {
+
+/// The same samples on a raster `scale` times as fine along each axis: each goes to the part of its pixel
+/// that its position (channels `xChannel`, `yChannel` of the band) falls in; positions outside the pixel to
+/// the nearest part, those that are not finite to the middle one. Samples of a part keep their order.
+SampleBand rebin(const SampleBand& band, int scale, std::size_t xChannel, std::size_t yChannel);
+
+}  // namespace vlx
