@@ -61,7 +61,7 @@ struct GltfText {
     int view(const std::vector<T>& values) {
         const std::size_t offset = bytes.size(), size = values.size() * sizeof(T);
         bytes.resize(offset + size);
-        std::memcpy(bytes.data() + offset, values.data(), size);
+        if (!values.empty()) std::memcpy(bytes.data() + offset, values.data(), size);
         while (bytes.size() % 4 != 0) bytes.push_back(0);
         json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", size}});
         return static_cast<int>(json["bufferViews"].size()) - 1;
