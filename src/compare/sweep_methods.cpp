@@ -14,7 +14,9 @@ const std::vector<SweepMethod>& builtInMethods() {
         {.name = "gaussian", .command = krige + "--method gaussian --sigma {sigma}"},
         {.name = "paper", .command = krige + "--method paper", .hierarchical = true, .inspectable = true},
         {.name = "krige-draft", .command = krige + "--method krige --quality draft"},
-        {.name = "krige-standard", .command = krige + "--method krige --quality standard", .hierarchical = true},
+        {.name = "krige-standard",
+         .command = krige + "--method krige --quality standard",
+         .hierarchical = true},
         {.name = "krige-high", .command = krige + "--method krige --quality high"},
     };
     return methods;
