@@ -231,7 +231,13 @@ struct TraceCommand {
                 if (share) j["share"] = std::round(*share * 1000) / 1000;
                 list.push_back(std::move(j));
             }
-            std::cout << nlohmann::ordered_json{{"effects", list}, {"lights", loaded.lights.size()}}.dump(2)
+            const nlohmann::ordered_json features{{"albedo", plan.features.albedo},
+                                                  {"normal", plan.features.normalAndDepth},
+                                                  {"depth", plan.features.normalAndDepth}};
+            std::cout << nlohmann::ordered_json{{"effects", list},
+                                                {"lights", loaded.lights.size()},
+                                                {"recorded", features}}
+                             .dump(2)
                       << "\n";
             return vlx::kDone;
         }
@@ -242,6 +248,10 @@ struct TraceCommand {
             std::printf("%-19s%-9s%-7s%s\n", std::string(nameOf(e.effect)).c_str(), e.planned ? "yes" : "no",
                         cost.c_str(), e.reason.c_str());
         }
+        if (!plan.features.albedo)
+            std::printf("not recorded: %s, %s\n",
+                        plan.features.normalAndDepth ? "albedo" : "albedo, normal and depth",
+                        plan.features.reason.c_str());
         return vlx::kDone;
     }
 

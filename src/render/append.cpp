@@ -22,9 +22,10 @@ std::string inWords(const Window& w) {
 }  // namespace
 
 EarlierDump::EarlierDump(const std::string& path) : reader_(path) {
-    for (const DumpChannel& channel : standardChannels())
-        if (channel.name != "sample.replicate" && findChannel(header(), channel.name) < 0)
-            throw Error(path, "expected a dump of vlx-trace, found none of its channel " + channel.name);
+    // Features may have been left out where they do not vary.
+    for (const std::string name : {"R", "G", "B", "A", "sample.x", "sample.y"})
+        if (findChannel(header(), name) < 0)
+            throw Error(path, "expected a dump of vlx-trace, found none of its channel " + name);
 }
 
 std::uint64_t EarlierDump::samples() const {

@@ -19,6 +19,10 @@ struct MaterialRange {
 
     /// Light that falls on it goes on.
     bool scatters() const { return spreads() || mirror || transmission; }
+    /// Nothing but the diffuse lobe, which reflects alike in all directions.
+    bool onlyDiffuse() const {
+        return diffuse && !(glossy || mirror || transmission || roughTransmission || clearcoat || sheen);
+    }
     /// Lights can be sampled there: a lobe that is not a delta function.
     bool spreads() const { return diffuse || glossy || roughTransmission || sheen; }
 };

@@ -91,6 +91,25 @@ class Analysis {
         return {};
     }
 
+    /// Misses have the alpha to tell them; whatever shines counts, being white in the dump.
+    RecordedFeatures features() const {
+        const Material* first = nullptr;
+        for (const Light& light : scene_.lights)
+            if (light.type == LightType::Sphere) return {};
+        for (std::size_t i = 0; i < scene_.shapes.size(); ++i) {
+            if (!reach_.shaded(i)) continue;
+            const Shape& shape = scene_.shapes[i];
+            const Material& m = scene_.materials[shape.material];
+            if (!ranges_.of(shape.material).onlyDiffuse() || m.emissive() || m.baseColourTexture ||
+                shape.firstColour >= 0)
+                return {};
+            if (first == nullptr) first = &m;
+            if (!(m.baseColour == first->baseColour)) return {};
+        }
+        if (first == nullptr) return {false, false, "there is nothing in sight"};
+        return {false, true, "all surfaces have one colour"};
+    }
+
     std::vector<std::size_t> idleLights() const {
         std::vector<std::size_t> list;
         for (std::size_t i = 0; i < idle_.size(); ++i)
@@ -308,7 +327,9 @@ Plan planEffects(const Scene& scene, const PlanOptions& options) {
         plan.warnings.push_back("the image is biased: " + std::string(nameOf(effect)) +
                                 " left out, although " + finding.reason);
     }
-    if (!plan.general) plan.idleLights = analysis.idleLights();
+    if (plan.general) return plan;
+    plan.idleLights = analysis.idleLights();
+    if (plan.leftOut.none()) plan.features = analysis.features();
     return plan;
 }
 

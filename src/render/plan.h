@@ -36,6 +36,13 @@ struct PlannedEffect {
     std::string reason;    ///< names what calls for it, or says why nothing does
 };
 
+/// Features of first hits that the dump is to hold: those that differ from hit to hit.
+struct RecordedFeatures {
+    bool albedo = true;
+    bool normalAndDepth = true;
+    std::string reason;  ///< why something is not recorded; else empty
+};
+
 /// What a picture of a scene is to simulate. Derived from the scene alone, before anything is traced, and
 /// conservative: what is not called for cannot be met by any path. What no path can meet calls for nothing:
 /// materials that nothing in reach has, surfaces out of the camera's sight where nothing in sight scatters,
@@ -45,7 +52,8 @@ struct Plan {
     bool general = false;  ///< everything is simulated, called for or not
     EffectSet called;
     EffectSet planned;
-    EffectSet leftOut;                    ///< called for, but not wanted: the image is biased
+    EffectSet leftOut;  ///< called for, but not wanted: the image is biased
+    RecordedFeatures features;
     std::vector<std::size_t> idleLights;  ///< lights that reach nothing
     std::vector<std::string> warnings;
 

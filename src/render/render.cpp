@@ -54,10 +54,18 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     DumpHeader header;
     header.display = {0, 0, options.width, options.height};
     header.data = options.crop.value_or(header.display);
-    header.channels = standardChannels();
     const bool replicates =
         options.replicates > 1 || (options.earlier != nullptr && options.earlier->hasReplicates());
-    if (!replicates) header.channels.pop_back();  // sample.replicate
+    // What is added to a dump has the channels that are there.
+    const RecordedFeatures features =
+        options.plan && options.earlier == nullptr ? options.plan->features : RecordedFeatures{};
+    for (const DumpChannel& channel : standardChannels()) {
+        if (!replicates && channel.name == "sample.replicate") continue;
+        if (!features.albedo && channel.name.starts_with("albedo.")) continue;
+        if (!features.normalAndDepth && (channel.name.starts_with("N.") || channel.name == "Z")) continue;
+        if (options.earlier != nullptr && findChannel(options.earlier->header(), channel.name) < 0) continue;
+        header.channels.push_back(channel);
+    }
     header.compression = options.compression;
     header.renderer = "vlx-trace" + (options.version.empty() ? "" : " " + options.version);
     header.scene = scene.name;
@@ -85,7 +93,11 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
 class ChannelArrays {
   public:
     explicit ChannelArrays(SampleBand& band) : count_(band.values.size()) {
-        for (std::size_t c = 0; c < count_; ++c) channels_[c] = band.values[c].data();
+        const auto& standard = standardChannels();
+        for (std::size_t c = 0, at = 0; c < count_; ++c, ++at) {
+            while (standard[at].name != band.channels[c]) ++at;  // in the same order, some left out
+            channels_[c] = {band.values[c].data(), at};
+        }
     }
     void put(std::uint64_t at, const Record& r) const {
         const PathSample& s = r.sample;
@@ -96,11 +108,11 @@ class ChannelArrays {
                                               s.albedo.y,   s.albedo.z,
                                               s.normal.x,   s.normal.y,
                                               s.normal.z,   static_cast<float>(r.replicate)};
-        for (std::size_t c = 0; c < count_; ++c) channels_[c][at] = values[c];
+        for (std::size_t c = 0; c < count_; ++c) channels_[c].first[at] = values[channels_[c].second];
     }
 
   private:
-    std::array<float*, 14> channels_{};
+    std::array<std::pair<float*, std::size_t>, 14> channels_{};  ///< and which value each takes
     std::size_t count_;
 };
 

@@ -4,6 +4,8 @@
 
 #include <functional>
 
+#include "../base/temporary_folder.h"
+#include "append.h"
 #include "camera.h"
 #include "effect_counters.h"
 #include "render.h"
@@ -443,6 +445,59 @@ TEST(Plan, EmittersThatFaceAwayAreIdle) {
     const Plan plan = planOf(t.finish());
     EXPECT_FALSE(plan.of(EmissiveMeshes).planned);
     EXPECT_NE(plan.of(EmissiveMeshes).reason.find("faces away"), std::string::npos);
+}
+
+TEST(Plan, FeaturesAreRecordedWhereTheyVary) {
+    const RecordedFeatures oneColour = planOf(corner().finish()).features;
+    EXPECT_FALSE(oneColour.albedo);
+    EXPECT_TRUE(oneColour.normalAndDepth);
+    EXPECT_TRUE(planOf(corner().finish(), "all").features.albedo);
+    EXPECT_TRUE(planOf(corner().finish(), "auto,-indirect").features.albedo) << "left out: nothing is sure";
+
+    TestScene two = corner();
+    add(two, TestScene::matte({0.7f, 0.6f, 0.4f}));
+    EXPECT_TRUE(planOf(two.finish()).features.albedo);
+    TestScene shining = corner();
+    add(shining, TestScene::emitter(Rgb(1)));
+    EXPECT_TRUE(planOf(shining.finish()).features.albedo) << "emitters are white in the dump";
+
+    TestScene sky;
+    sky.environment(render::Environment(Rgb(1)));
+    sky.camera({0, 1, 4}, {0, 1, 0}, 0.9f);
+    EXPECT_FALSE(planOf(sky.finish()).features.normalAndDepth);
+}
+
+TEST(Plan, FeaturesThatAreNotRecordedAreTheSameInAllSamplesThatHit) {
+    const Shot shot = shoot(corner().finish(), "auto");
+    std::size_t hits = 0;
+    for (const PathSample& s : shot.samples) {
+        if (!s.hit) continue;
+        ASSERT_EQ(s.albedo, Rgb(0.7f, 0.6f, 0.5f));
+        ++hits;
+    }
+    EXPECT_GT(hits, shot.samples.size() / 4);
+}
+
+TEST(Plan, TheDumpLacksWhatIsNotRecorded) {
+    TemporaryFolder folder;
+    Scene scene = corner().finish();
+    RenderOptions options;
+    options.width = options.height = kSide;
+    options.spp = 2;
+    renderDump(scene, Accelerator(scene), folder / "all.exr", options);
+    options.follow(planOf(scene));
+    renderDump(scene, Accelerator(scene), folder / "few.exr", options);
+    const DumpReader all(folder / "all.exr"), few(folder / "few.exr");
+    EXPECT_EQ(findChannel(few.header(), "albedo.G"), -1);
+    const std::vector<std::string> kept = {"R",        "G",        "B",   "A",   "Z",
+                                           "sample.x", "sample.y", "N.X", "N.Y", "N.Z"};
+    EXPECT_EQ(few.header().channels.size(), kept.size());
+    EXPECT_EQ(few.read(0, kSide, kept).values, all.read(0, kSide, kept).values);
+
+    const EarlierDump earlier(folder / "few.exr");
+    options.earlier = &earlier;
+    renderDump(scene, Accelerator(scene), folder / "more.exr", options);
+    EXPECT_EQ(DumpReader(folder / "more.exr").header().channels.size(), kept.size());
 }
 
 TEST(Plan, OpacityThatIsOneEverywhereCallsForNothing) {
