@@ -382,6 +382,7 @@ class Pipeline {
                 report.ownNeighbourhoods += of.own;
                 report.failedNeighbourhoods += of.failed;
                 report.driftFunctions += of.effective;
+                report.driftFeatures += of.features;
             }
             krigedRows_ = std::min(height_, krigedRows_ + kTile);
             watch_.addTo(report.seconds["kriging"]);

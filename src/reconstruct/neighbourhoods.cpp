@@ -13,8 +13,11 @@ namespace vlx {
 namespace {
 
 constexpr int kOffsets = 2 * kMaxReach + 1;
-constexpr int kPositionFunctions = 5;      // x, y, x^2, y^2, xy
-constexpr float kLeastWeight = 0.01f;      // of a datum
+constexpr int kPositionFunctions = 5;         // x, y, x^2, y^2, xy
+constexpr float kLeastWeight = 0.01f;         // of a datum
+constexpr float kFarthest = 3.6f;             // nearExp is below kLeastWeight from here on
+constexpr double kLeastFeatureSpread = 1e-8;  // squared: less is a constant
+constexpr double kLeastPositionSpread = 1e-12;
 constexpr float kCoveringWeight = 0.2f;    // a pixel less like its regular centres gets its own
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
 constexpr float kFeatureWidth2 = 0.04f;    // (a fifth of a feature's scale)^2: as unlike as noise of one
@@ -69,6 +72,25 @@ VLX_WIDE void weightedGram(const float* x, const float* w, int rows, int stride,
                 for (int c = 0; c < kBlockColumns; ++c)
                     gram[(a + r) * rows + b + c] = sums[r * kBlockColumns + c];
         }
+}
+
+/// Weighted variance of n values, a multiple of 8 (the rest zero), whose weights add up to `total`.
+VLX_WIDE double weightedSpread(const float* x, const float* w, int n, double total) {
+    double sums[2];
+    Lanes first = {}, second = {};
+    for (int i = 0; i < n; i += 8) {
+        Lanes value, weight;
+        std::memcpy(&value, x + i, sizeof(Lanes));
+        std::memcpy(&weight, w + i, sizeof(Lanes));
+        first += weight * value;
+        second += weight * value * value;
+    }
+    sums[0] = sums[1] = 0;
+    for (int k = 0; k < 8; ++k) {
+        sums[0] += static_cast<double>(first[k]);
+        sums[1] += static_cast<double>(second[k]);
+    }
+    return (sums[1] - sums[0] * sums[0] / total) / total;
 }
 
 /// estimates[i] = offset + sum_j coefficient_j x_j,i
@@ -182,7 +204,7 @@ class Tile {
                             int dy) const {
         const float patches = distance(1 - half, col, row, dx, dy) / (model.tolerance * model.tolerance);
         float d = std::max(0.f, patches);
-        if (!model.features) return d;
+        if (!model.features || d > kFarthest) return d;
         const auto here = static_cast<std::size_t>(inner(col, row));
         const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
         for (int f = 0; f < in_.featureCount; ++f) {
@@ -211,16 +233,15 @@ class Tile {
 
     void krigeCentre(const NeighbourhoodModel& model, int half, int col, int row,
                      NeighbourhoodCounts& counts) {
-        const int reach = model.reach, functions = in_.featureCount + kPositionFunctions;
-        const int channels = in_.planes.radiance, used = 1 + functions + channels;
-        const int rows = (used + kBlockRows - 1) / kBlockRows * kBlockRows;
+        const int reach = model.reach, channels = in_.planes.radiance;
         const int stride = lanesUp((2 * reach + 1) * (2 * reach + 1));
         const auto centre = static_cast<std::size_t>(inner(col, row));
 
         index_.clear();
         weights_.clear();
-        x_values_.resize(static_cast<std::size_t>(rows * stride));
-        float* const places = x_values_.data() + (1 + in_.featureCount) * stride;
+        const int most = 1 + kPositionFunctions + in_.featureCount + channels + kBlockRows;
+        x_values_.resize(static_cast<std::size_t>(most * stride));
+        float* const places = x_values_.data() + stride;
         const float perReach = 1.f / static_cast<float>(reach);
         const float own = std::max(1.f, counts_[half][centre]);
         double noise = 0, total = 0;
@@ -250,30 +271,39 @@ class Tile {
         ++counts.neighbourhoods;
         const auto n = static_cast<int>(index_.size());
         const int padded = lanesUp(n);
+        weights_.resize(static_cast<std::size_t>(padded), 0.f);
 
-        // Rows of the data: 1, features and position about the centre, radiance about the centre's.
+        // Rows of the data: 1, position and features about the centre, radiance about the centre's. Features
+        // that are constant here explain nothing: they have no row.
         float* const constant = x_values_.data();
         std::fill_n(constant, n, 1.f);
         std::array<double, kMaxRandomDrift> featureNoise{};
+        varying_.clear();
         for (int f = 0; f < in_.featureCount; ++f) {
             const float* values = features_.data() + plane(f);
-            const float* errors = features_.data() + plane(in_.featureCount + f);
             const float about = values[centre];
-            float* x = constant + (1 + f) * stride;
+            float* x = constant + (1 + kPositionFunctions + static_cast<int>(varying_.size())) * stride;
+            for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - about;
+            std::fill(x + n, x + padded, 0.f);
+            if (weightedSpread(x, weights_.data(), padded, total) < kLeastFeatureSpread) continue;
+            const float* errors = features_.data() + plane(in_.featureCount + f);
             double sum = 0;
             for (int i = 0; i < n; ++i) {
-                const auto at = static_cast<std::size_t>(index_[static_cast<std::size_t>(i)]);
-                x[i] = values[at] - about;
-                sum += static_cast<double>(weights_[static_cast<std::size_t>(i)] * errors[at]);
+                const auto k = static_cast<std::size_t>(i);
+                sum += static_cast<double>(weights_[k] * errors[index_[k]]);
             }
-            featureNoise[static_cast<std::size_t>(f)] = sum;
+            featureNoise[varying_.size()] = sum;
+            varying_.push_back(f);
         }
+        counts.features += static_cast<std::int64_t>(varying_.size());
+        const int functions = kPositionFunctions + static_cast<int>(varying_.size());
+        const int used = 1 + functions + channels;
+        const int rows = (used + kBlockRows - 1) / kBlockRows * kBlockRows;
         for (int c = 0; c < channels; ++c) {
             const float* values = means_[half].data() + plane(c);
             float* x = constant + (1 + functions + c) * stride;
             for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - values[centre];
         }
-        weights_.resize(static_cast<std::size_t>(padded), 0.f);
         for (int r = 0; r < rows; ++r)
             std::fill(constant + r * stride + (r < used ? n : 0), constant + r * stride + padded, 0.f);
         weighted_.resize(x_values_.size());
@@ -298,11 +328,13 @@ class Tile {
         std::array<double, kMaxRandomDrift> unit{};
         for (int j = 0; j < functions; ++j) {
             const double square = centred(1 + j, 1 + j) / total;
-            if (square < (j < in_.featureCount ? 1e-8 : 1e-12)) continue;
+            const int f = j - kPositionFunctions;  // which of varying_
+            if (!(square > (f < 0 ? kLeastPositionSpread : kLeastFeatureSpread))) continue;
             unit[used_.size()] = 1 / std::sqrt(square);
             used_.push_back(1 + j);
-            group_.push_back(j < in_.featureCount ? in_.group[static_cast<std::size_t>(j)]
-                                                  : in_.groups + (j - in_.featureCount >= 2));
+            group_.push_back(
+                f < 0 ? in_.groups + (j >= 2)
+                      : in_.group[static_cast<std::size_t>(varying_[static_cast<std::size_t>(f)])]);
         }
         const auto p = static_cast<Eigen::Index>(used_.size());
         DriftMoments moments;
@@ -317,10 +349,11 @@ class Tile {
                 moments.normal(a, b) = moments.normal(b, a) =
                     centred(used_[i], used_[j]) * unit[i] * unit[j] / variance;
             }
-            if (used_[i] <= in_.featureCount)
-                moments.normal(a, a) += kFeatureErrorFactor *
-                                        featureNoise[static_cast<std::size_t>(used_[i] - 1)] * unit[i] *
-                                        unit[i] / variance;
+            if (used_[i] > kPositionFunctions)
+                moments.normal(a, a) +=
+                    kFeatureErrorFactor *
+                    featureNoise[static_cast<std::size_t>(used_[i] - 1 - kPositionFunctions)] * unit[i] *
+                    unit[i] / variance;
             for (int c = 0; c < channels; ++c)
                 moments.right(a, c) = centred(used_[i], 1 + functions + c) * unit[i] / variance;
         }
@@ -383,7 +416,7 @@ class Tile {
     std::vector<float> means_[2], counts_[2], errors_[2], distances_[2], references_, features_, scratch_;
 
     // Of the centre at work.
-    std::vector<int> index_, used_, group_;
+    std::vector<int> index_, varying_, used_, group_;
     std::vector<float> weights_, x_values_, weighted_, estimates_, sums_;
     std::vector<double> gram_;
 };
@@ -403,6 +436,7 @@ NeighbourhoodCounts krigeTile(const TileInput& input, const std::vector<Neighbou
         counts.own += of.own;
         counts.failed += of.failed;
         counts.effective += of.effective;
+        counts.features += of.features;
     }
     return counts;
 }

@@ -55,9 +55,11 @@ struct TileInput {
 
 struct NeighbourhoodCounts {
     std::int64_t neighbourhoods = 0;
-    std::int64_t own = 0;     ///< centred on a pixel that no regular one fits
-    std::int64_t failed = 0;  ///< equations not solvable: the neighbourhood's weighted mean
-    double effective = 0;     ///< sum of effective numbers of drift functions
+    std::int64_t own = 0;       ///< centred on a pixel that no regular one fits
+    std::int64_t failed = 0;    ///< equations not solvable: the neighbourhood's weighted mean
+    std::int64_t features = 0;  ///< sum of numbers of features that vary in the neighbourhood: the others are
+                                ///< no drift there
+    double effective = 0;       ///< sum of effective numbers of drift functions
 };
 
 /// All neighbourhoods centred in the tile at (x, y), of all models and both halves. estimates[m] takes the

@@ -10,6 +10,10 @@ namespace vlx {
 
 namespace {
 
+double perNeighbourhood(const ReconstructionReport& report, double sum) {
+    return report.neighbourhoods > 0 ? sum / static_cast<double>(report.neighbourhoods) : 0;
+}
+
 nlohmann::ordered_json json(const ReconstructionReport& report) {
     nlohmann::ordered_json regions = nlohmann::ordered_json::object();
     for (int i = 0; i < kRegionOutcomes; ++i)
@@ -27,8 +31,8 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
         {"neighbourhoods", report.neighbourhoods},
         {"ownNeighbourhoods", report.ownNeighbourhoods},
         {"failedNeighbourhoods", report.failedNeighbourhoods},
-        {"driftFunctions",
-         report.neighbourhoods > 0 ? report.driftFunctions / static_cast<double>(report.neighbourhoods) : 0},
+        {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
+        {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
         {"readSeconds", report.readSeconds},
         {"solveSeconds", report.solveSeconds}};
     if (!report.seconds.empty()) document["seconds"] = report.seconds;
@@ -146,8 +150,8 @@ std::string toText(const ReconstructionReport& report) {
              << " % of the light removed\n";
     if (report.neighbourhoods > 0)
         text << report.neighbourhoods << " neighbourhoods kriged, "
-             << report.driftFunctions / static_cast<double>(report.neighbourhoods)
-             << " drift functions on average\n";
+             << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
+             << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
     if (report.failedNeighbourhoods > 0)
         text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
     if (report.jitteredSystems > 0) text << report.jitteredSystems << " systems needed jitter\n";

@@ -57,6 +57,8 @@ struct ReconstructionReport {
     std::int64_t neighbourhoods = 0;        ///< kriged (default method), over models and halves
     std::int64_t ownNeighbourhoods = 0;     ///< centred on pixels unlike their regular centres
     std::int64_t failedNeighbourhoods = 0;  ///< not solvable: their weighted mean
+    std::int64_t driftFeatures = 0;         ///< sum over neighbourhoods of the features that vary there; the
+                                            ///< others are no drift
     double driftFunctions = 0;              ///< sum over neighbourhoods of the effective number of functions
     std::map<std::string, double> seconds;  ///< wall time by stage (default method)
     double readSeconds = 0;                 ///< wall time in the reader
