@@ -1,5 +1,6 @@
 #include "finished.h"
 
+#include <sys/stat.h>
 #include <xxhash.h>
 
 #include <cstdio>
@@ -8,6 +9,7 @@
 #include <memory>
 
 #include "tool_main.h"
+#include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 
 namespace vlx {
@@ -25,6 +27,18 @@ const std::set<std::string>& notCounted() {
 std::string hex(std::uint64_t value) {
     char text[17];
     std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+    return text;
+}
+
+std::string identityOf(const std::string& path) {
+    struct stat is {};
+    if (::stat(path.c_str(), &is) != 0) return {};
+    std::string text;
+    for (const auto part :
+         {static_cast<std::int64_t>(is.st_dev), static_cast<std::int64_t>(is.st_ino),
+          static_cast<std::int64_t>(is.st_size), static_cast<std::int64_t>(is.st_mtim.tv_sec),
+          static_cast<std::int64_t>(is.st_mtim.tv_nsec)})
+        text += std::to_string(part) + ' ';
     return text;
 }
 
@@ -52,6 +66,7 @@ void InputsHash::addBytes(const std::string& bytes) { folded_ += hex(XXH64(bytes
 
 void InputsHash::addFile(const std::string& path) {
     if (path.empty()) return;
+    files_.push_back({path, identityOf(path)});
     const std::unique_ptr<XXH64_state_t, XXH_errorcode (*)(XXH64_state_t*)> state(XXH64_createState(),
                                                                                   XXH64_freeState);
     XXH64_reset(state.get(), 0);
@@ -64,6 +79,11 @@ void InputsHash::addFile(const std::string& path) {
         XXH64_update(state.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
     }
     folded_ += hex(XXH64_digest(state.get()));
+}
+
+void InputsHash::checkUnchanged() const {
+    for (const File& file : files_)
+        if (identityOf(file.path) != file.identity) throw Error(file.path, "changed while it was read");
 }
 
 std::string InputsHash::text(const Band& band) const {

@@ -25,13 +25,23 @@ class InputsHash {
     /// The contents of a file, read as a stream. An empty name is no file; one that cannot be read counts as
     /// empty: whoever reads it will say so.
     void addFile(const std::string& path);
+    /// Throws Error when a file has become another one since it was added: what was read of it may not be
+    /// what the hash is of.
+    void checkUnchanged() const;
 
     /// 16 hexadecimal digits, and "band 2/5" after them where only a band is made.
     std::string text(const Band& band = {}) const;
 
   private:
+    struct File {
+        std::string path;
+        std::string identity;  ///< which file it was, its size and the time of its last change
+    };
+
     void addBytes(const std::string& bytes);
+
     std::string folded_;  ///< digests of what was added
+    std::vector<File> files_;
 };
 
 /// Whether all `outputs` are there, and those that are EXR images say that they are made of `inputs`. If so,

@@ -213,13 +213,6 @@ std::uint64_t parseMemory(const std::string& text) {
     return static_cast<std::uint64_t>(value * (unit == 'G' ? 1e9 : 1e6));
 }
 
-/// What variolux:inputs is to say.
-std::string inputsOf(const Options& o) {
-    vlx::InputsHash hash(*o.commandLine, {"DUMP"});
-    hash.addFile(o.dump);
-    return hash.text(o.krige.band);
-}
-
 void kriged(const Options& o, const vlx::Progress& progress) {
     if (!o.samplingMap.empty()) {
         vlx::checkOutputName(o.samplingMap, {o.dump, o.image});
@@ -229,7 +222,9 @@ void kriged(const Options& o, const vlx::Progress& progress) {
     vlx::checkOutputName(o.image, {o.dump});
     vlx::ImageWriteOptions write;
     write.attributes["Software"] = "vlx-krige";
-    const std::string inputs = write.attributes[vlx::kInputsAttribute] = inputsOf(o);
+    vlx::InputsHash hash(*o.commandLine, {"DUMP"});
+    hash.addFile(o.dump);
+    const std::string inputs = write.attributes[vlx::kInputsAttribute] = hash.text(o.krige.band);
     std::vector<std::string> outputs = {o.image};
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
     if (o.diagnostics) outputs.push_back(o.image + ".json");
@@ -245,9 +240,11 @@ void kriged(const Options& o, const vlx::Progress& progress) {
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
         report = vlx::reconstructDriftKriging(
             dump, o.krige, [&](const float* rows, int count) { writer.write(rows, count); }, progress);
+        hash.checkUnchanged();
         writer.close();
     } else {
         vlx::Reconstruction result = reconstruct(o, dump, progress);
+        hash.checkUnchanged();
         const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
         if (o.diagnostics) vlx::addDiagnosticLayers(result);
         // Both files or none: the image gets its name only when the JSON is complete.

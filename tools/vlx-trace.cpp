@@ -229,8 +229,9 @@ struct TraceCommand {
         if (environmentConstant.size() == 3)
             environment.constant =
                 Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
+        std::optional<vlx::InputsHash> hash;
         if (renders) {
-            options.inputs = inputs();
+            options.inputs = hash.emplace(inputs()).text(options.band);
             if (!overwrite && vlx::isFinished({dump}, options.inputs)) return skip();
         }
         Scene loaded = loadScene(scene, environment, exposure);
@@ -260,6 +261,7 @@ struct TraceCommand {
 
         const Accelerator accelerator(loaded, options.path.effects);
         if (timeLimit > 0 || targetError > 0) chooseSamples(loaded, accelerator);
+        hash->checkUnchanged();  // all is read but the dump that is added to, which stays open
         const RenderReport report = renderDump(loaded, accelerator, dump, options, progress);
         if (report.nonFinite > 0)
             note("warning: " + std::to_string(report.nonFinite) +
@@ -268,14 +270,14 @@ struct TraceCommand {
         return vlx::kDone;
     }
 
-    /// What variolux:inputs is to say.
-    std::string inputs() const {
+    /// Of what variolux:inputs is to say.
+    vlx::InputsHash inputs() const {
         vlx::InputsHash hash(*commandLine, {"SCENE", "--env", "--append", "--sample-map"});
         hash.add("scene", std::filesystem::path(scene).filename().string());  // it is in the header
         if (frame) hash.add("frame", std::to_string(*frame));
         for (const std::string& file : gltfFiles(scene)) hash.addFile(file);
         for (const std::string& file : {environment.image, earlierPath, mapPath}) hash.addFile(file);
-        return hash.text(options.band);
+        return hash;
     }
 
     int skip() const {

@@ -70,6 +70,14 @@ TEST(ParseFrames, ListsRangesAndSteps) {
         EXPECT_THROW(parseFrames(text), CLI::ValidationError) << text;
 }
 
+TEST(ParseBand, CountsFromOne) {
+    const Band band = parseBand("2/5");
+    EXPECT_EQ(band.index, 1);
+    EXPECT_EQ(band.count, 5);
+    for (const char* text : {"0/2", "3/2", "1", "1/2x", "a/b", "-1/2", "1/", "/2"})
+        EXPECT_THROW(parseBand(text), CLI::ValidationError) << text;
+}
+
 TEST(FrameName, PutsTheNumberInPlaceOfEachRun) {
     EXPECT_EQ(frameName("a_####.exr", 12), "a_0012.exr");
     EXPECT_EQ(frameName("a_##.exr", 123), "a_123.exr");
