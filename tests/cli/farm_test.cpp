@@ -290,13 +290,31 @@ TEST(Load, ThirtyTwoProcessesAtOnceFinishWithinTheirLimits) {
 }
 #endif
 
-// A disk of 256 KB that is full in the midst of the work.
+/// A disk of 256 KB; root only.
+class SmallDisk {
+  public:
+    explicit SmallDisk(std::string folder) : folder_(std::move(folder)) {
+        fs::create_directory(folder_);
+        mounted_ = ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=256k") == 0;
+    }
+    ~SmallDisk() {
+        if (mounted_) ::umount2(folder_.c_str(), MNT_DETACH);
+    }
+    SmallDisk(const SmallDisk&) = delete;
+    SmallDisk& operator=(const SmallDisk&) = delete;
+    bool mounted() const { return mounted_; }
+
+  private:
+    std::string folder_;
+    bool mounted_ = false;
+};
+
+// Full in the midst of the work.
 TEST(FullDisk, IsSaidAndLeavesNothing) {
     const TemporaryFolder folder;
     const std::string disk = folder / "disk";
-    fs::create_directory(disk);
-    if (::mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=256k") != 0)
-        GTEST_SKIP() << "needs root to mount a small disk";
+    const SmallDisk small(disk);
+    if (!small.mounted()) GTEST_SKIP() << "needs root to mount a small disk";
     const Arguments trace = {kScene, "--width", "96", "--spp", "4", "-o", disk + "/a.exr"};
     Arguments stack = {"stack", "-o", disk + "/b.exr"};
     for (int i = 0; i < 4; ++i) {
@@ -321,7 +339,6 @@ TEST(FullDisk, IsSaidAndLeavesNothing) {
         EXPECT_NE(run.err.find(disk), std::string::npos) << run.err;
         EXPECT_TRUE(fs::is_empty(disk)) << job.tool << " left something";
     }
-    ::umount(disk.c_str());
 }
 
 // The dump becomes another one while it is kriged: cut short in place, as careless copies do, or replaced.
