@@ -11,6 +11,7 @@
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
+#include "variolux/compare/child_process.h"
 #include "variolux/compare/picture.h"
 #include "variolux/compare/sweep.h"
 #include "variolux/compare/sweep_page.h"
@@ -28,7 +29,6 @@ struct SweepCommand {
     std::vector<std::string> targets;
     std::vector<std::string> crops;
     bool noVariations = false;
-    bool quiet = false;
 
     void bind(CLI::App& app) {
         SweepOptions& o = options;
@@ -51,7 +51,6 @@ struct SweepCommand {
         app.add_option("--threads", o.threads, "Threads of the programs; 0: all processors")
             ->check(CLI::Range(0, 1024))
             ->option_text("N");
-        app.add_flag("-q,--quiet", quiet, "Print nothing but errors and --target's answer");
 
         const char* const sampling = "Sampling";
         app.add_option("--spp", o.spp,
@@ -219,12 +218,12 @@ struct SweepCommand {
         const ThreadLimit limit(options.threads);
 
         const Sweep sweep = runSweep(options, [&](const std::string& text) {
-            if (!quiet) std::fprintf(stderr, "%s\n", text.c_str());
+            if (!isQuiet()) std::fprintf(stderr, "%s\n", text.c_str());
         });
         const SweepSummary summary = summarize(sweep);
         page.targets = wanted;
         writePage(sweep, summary, page);
-        if (!quiet)
+        if (!isQuiet())
             std::printf("%s%d of %zu results were there already\nReport: %s/report.html\n",
                         toText(summary, sweep).c_str(), sweep.reused, sweep.records.size(),
                         options.folder.c_str());
@@ -271,6 +270,7 @@ int sweepMain(int argc, char** argv) {
         "vlx-compare sweep");
     SweepCommand command;
     command.bind(app);
+    onEndingSignal(endRunningCommand);
     return runTool(argc, argv, app, [&] { return command.run(); });
 }
 

@@ -5,12 +5,6 @@
 
 namespace vlx {
 
-/// Thrown by --help-man instead of a run.
-struct ManPage {
-    explicit ManPage(std::string page) : text(std::move(page)) {}
-    std::string text;
-};
-
 /// The manual page of a tool, in roff (section 1), from its command line's definitions: options and commands
 /// with their options, footers as they are, exit codes. `app` keeps nothing of it.
 std::string manPage(const CLI::App& app, const std::string& version);

@@ -47,6 +47,7 @@ struct ImportCommand {
             ->take_all();
     }
     int print(const ImportReport& report, const std::string& what) const {
+        if (isQuiet()) return kDone;
         std::cout << dump << ": " << what << "\n";
         for (const auto& [channel, source] : report.mapped)
             std::cout << "  " << channel << " from " << source << "\n";

@@ -20,25 +20,41 @@ int terminalColumns(std::FILE* stream) {
 }
 
 std::atomic<LogFormat> currentFormat{LogFormat::Text};
+std::atomic<bool> barsHidden{false};
+std::atomic<ProgressBar*> lastBar{nullptr};
 
 std::string twoDigits(std::int64_t value) { return (value < 10 ? "0" : "") + std::to_string(value); }
 
 }  // namespace
 
 ProgressBar::ProgressBar(std::string label, std::FILE* stream)
-    : label_(std::move(label)), stream_(stream), terminal_(::isatty(::fileno(stream)) == 1) {}
+    : label_(std::move(label)), stream_(stream), terminal_(::isatty(::fileno(stream)) == 1) {
+    lastBar = this;
+}
 
 void setLogFormat(LogFormat format) { currentFormat = format; }
 LogFormat logFormat() { return currentFormat; }
+void hideProgressBars(bool hidden) { barsHidden = hidden; }
+void eraseProgressBar() {
+    if (ProgressBar* const bar = lastBar) bar->erase();
+}
 
 ProgressBar::~ProgressBar() {
+    ProgressBar* self = this;
+    lastBar.compare_exchange_strong(self, nullptr);
+    erase();
+}
+
+void ProgressBar::erase() {
+    const std::lock_guard lock(mutex_);
     if (!visible_ || logFormat() != LogFormat::Text) return;
     std::fputs("\r\033[K", stream_);
     std::fflush(stream_);
+    visible_ = false;
 }
 
 ProgressBar::operator Progress() {
-    if (!terminal_ && logFormat() == LogFormat::Text) return {};
+    if ((!terminal_ || barsHidden) && logFormat() == LogFormat::Text) return {};
     return [this](std::int64_t done, std::int64_t total) { update(done, total); };
 }
 

@@ -20,6 +20,10 @@ enum class LogFormat {
 /// For all progress from now on. Called once, before any.
 void setLogFormat(LogFormat format);
 LogFormat logFormat();
+/// No bars for people from now on.
+void hideProgressBars(bool hidden);
+/// Takes the bar that is drawn, if there is one, off the terminal, before a line is written there.
+void eraseProgressBar();
 
 /// One line that says how far a task is: label, bar, percent, time left. Redrawn in place at most ten times a
 /// second, and only when `stream` is a terminal: nothing is written into a log file or a pipe. Erased when
@@ -34,6 +38,8 @@ class ProgressBar {
 
     /// What library functions report to; empty when nothing is drawn.
     operator Progress();
+
+    void erase();
 
   private:
     using Clock = std::chrono::steady_clock;

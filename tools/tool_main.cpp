@@ -10,6 +10,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "completion.h"
 #include "help_formatter.h"
 #include "man_page.h"
 #include "progress_bar.h"
@@ -20,14 +21,23 @@ namespace vlx {
 
 namespace {
 
+bool quietAsked = false;
+void (*endingAction)() noexcept = nullptr;
+
 constexpr char kExitCodes[] =
     "Exit codes: 0 done; 1 failure at run time (a file, the disk, memory); 2 bad usage; 3 a comparison "
     "passed "
     "its threshold. Ended by a signal, it leaves no unfinished files.";
 
+// Thrown by --help-man and --completion instead of a run.
+struct Printed {
+    std::string text;
+};
+
 // Leaves no unfinished files, then ends as the signal would have ended it.
 extern "C" void endBySignal(int number) {
     removeUnfinishedFiles();
+    if (endingAction != nullptr) endingAction();
     std::signal(number, SIG_DFL);
     std::raise(number);
 }
@@ -44,6 +54,11 @@ void catchSignals() {
     }
 }
 
+void printRecord(const nlohmann::ordered_json& record) {
+    std::fputs((record.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n").c_str(),
+               stderr);
+}
+
 // The end of a run, for programs.
 void logEnd(int code, const std::string& message) {
     if (logFormat() == LogFormat::OpenJd && code != kDone && !message.empty()) {
@@ -57,14 +72,18 @@ void logEnd(int code, const std::string& message) {
     nlohmann::ordered_json record = {
         {"event", "end"}, {"exitCode", code}, {"peakMemoryMB", std::round(peakMegabytes())}};
     if (!message.empty()) record["message"] = message;
-    std::fputs((record.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n").c_str(),
-               stderr);
+    printRecord(record);
 }
 
-int fail(const CLI::App& app, std::string message) {
-    // Messages quote names out of files, which may hold what a terminal would obey.
+// Messages quote names out of files, which may hold what a terminal would obey.
+std::string printable(std::string message) {
     for (char& c : message)
         if ((static_cast<unsigned char>(c) < 32 && c != '\n') || c == 127) c = '?';
+    return message;
+}
+
+int fail(const CLI::App& app, const std::string& text) {
+    const std::string message = printable(text);
     if (logFormat() != LogFormat::Json)
         std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), message.c_str());
     logEnd(kFailed, message);
@@ -92,8 +111,11 @@ void addCommonOptions(CLI::App& app, LogFormat& format) {
             {{"text", LogFormat::Text}, {"json", LogFormat::Json}, {"openjd", LogFormat::OpenJd}},
             "Progress for people, as lines of JSON on standard error, or as Open Job Description's lines on "
             "standard output");
-        command->add_flag_callback("--help-man", [&app] { throw ManPage(manPage(app, VARIOLUX_VERSION)); })
+        command->add_flag("-q,--quiet", quietAsked,
+                          "Print nothing but errors and what other options ask for");
+        command->add_flag_callback("--help-man", [&app] { throw Printed{manPage(app, VARIOLUX_VERSION)}; })
             ->group("");
+        command->add_flag_callback("--completion", [&app] { throw Printed{bashCompletion(app)}; })->group("");
     }
     const std::string footer = app.get_footer();
     app.footer(footer + (footer.empty() ? "" : "\n\n") + wrapped(kExitCodes, 80));
@@ -118,13 +140,14 @@ int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& ru
     try {
         app.parse(argc, argv);
         setLogFormat(format);
+        hideProgressBars(quietAsked);
         const int code = run();
         // Results on stdout that did not get there are a failure too.
         std::cout.flush();
         if (!std::cout || std::fflush(stdout) != 0) return fail(app, "standard output cannot be written");
         logEnd(code, {});
         return code;
-    } catch (const ManPage& page) {
+    } catch (const Printed& page) {
         std::fputs(page.text.c_str(), stdout);
         return std::fflush(stdout) == 0 ? kDone : kFailed;
     } catch (const CLI::ParseError& error) {
@@ -137,6 +160,22 @@ int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& ru
     } catch (const std::exception& error) {
         return fail(app, std::string("internal error: ") + error.what());
     }
+}
+
+void onEndingSignal(void (*action)() noexcept) { endingAction = action; }
+
+bool isQuiet() { return quietAsked; }
+
+void say(const std::string& text) {
+    if (!quietAsked) warn(text);
+}
+
+void warn(const std::string& text) {
+    eraseProgressBar();
+    if (logFormat() == LogFormat::Json)
+        printRecord({{"event", "message"}, {"message", text}});
+    else
+        std::fprintf(stderr, "%s\n", printable(text).c_str());
 }
 
 void checkOutputName(const std::string& output, const std::vector<std::string>& inputs) {

@@ -17,10 +17,10 @@ enum ExitCode : int {
     kPassed = 3,    ///< a comparison passed its threshold
 };
 
-/// The main function of a tool: adds --version, --log and --help-man (and the exit codes to the help's end)
-/// to `app`, catches signals, parses the command line, calls `run`, and turns what goes wrong into a message
-/// on stderr and an exit code. `run` returns an ExitCode; it may throw vlx::Error (exit 1) or
-/// CLI::ValidationError (options that do not fit together: exit 2).
+/// The main function of a tool: adds --version, --log, --quiet, --help-man and --completion (and the exit
+/// codes to the help's end) to `app`, catches signals, parses the command line, calls `run`, and turns what
+/// goes wrong into a message on stderr and an exit code. `run` returns an ExitCode; it may throw vlx::Error
+/// (exit 1) or CLI::ValidationError (options that do not fit together: exit 2).
 ///
 ///     int main(int argc, char** argv) {
 ///         CLI::App app("What the tool does", "vlx-something");
@@ -29,6 +29,17 @@ enum ExitCode : int {
 ///         return vlx::runTool(argc, argv, app, [&] { return run(options); });
 ///     }
 int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run);
+
+/// What a signal that ends the tool is to do besides removing unfinished files; async-signal-safe.
+void onEndingSignal(void (*action)() noexcept);
+
+/// A line on standard error, above a progress bar: nothing when --quiet was given, a record
+/// {"event":"message","message":...} with --log json.
+void say(const std::string& text);
+/// The same for what is wrong, also when --quiet was given.
+void warn(const std::string& text);
+/// Whether --quiet was given: a tool then prints errors and what its other options ask for, nothing else.
+bool isQuiet();
 
 /// Throws CLI::ValidationError (exit 2) unless `output` ends with .exr and is another file than each of
 /// `inputs`: what would otherwise cost the input, or be found out after hours of work.

@@ -220,7 +220,8 @@ int run(const Options& options) {
     report.violations = checkLimits(report, limits);
 
     if (!options.pictures.empty()) writePictures(options, picture, reference, inputs, report);
-    std::fputs((options.json ? toJson(report) : toText(report)).c_str(), stdout);
+    if (options.json || !isQuiet())
+        std::fputs((options.json ? toJson(report) : toText(report)).c_str(), stdout);
     if (report.violations.empty()) return kDone;
     for (const Violation& violation : report.violations)
         std::fprintf(stderr, "vlx-compare: limit passed: %s\n", describe(violation).c_str());

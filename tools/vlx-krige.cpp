@@ -1,9 +1,14 @@
+#include <malloc.h>
+
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <optional>
 #include <string>
 
+#include "finished.h"
+#include "frames.h"
 #include "progress_bar.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
@@ -37,11 +42,15 @@ struct Options {
     bool diagnostics = false;
     std::vector<std::string> inspect;
     bool json = false;
-    bool quiet = false;
     int threads = 0;
+    std::string maxMemory;
+    std::string frames;
+    bool overwrite = false;
+    const CLI::App* commandLine = nullptr;
 };
 
 void bind(CLI::App& app, Options& o) {
+    o.commandLine = &app;
     app.add_option("DUMP", o.dump, "Sample dump (deep OpenEXR) of any renderer")->required();
     app.add_option("-o,--output", o.image,
                    "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
@@ -126,7 +135,17 @@ void bind(CLI::App& app, Options& o) {
         ->take_all()
         ->expected(1);
     app.add_flag("--json", o.json, "Print the report as JSON on standard output");
-    app.add_flag("-q,--quiet", o.quiet, "Print nothing but errors");
+    app.add_option(
+           "--frames", o.frames,
+           "Krige these frames, for example 1-100x2,150: #### in the names of files stands for the frame's "
+           "number. When a frame fails the others go on")
+        ->option_text("LIST");
+    vlx::addOverwrite(app, o.overwrite);
+    app.add_option(
+           "--max-memory", o.maxMemory,
+           "krige: memory of the process at most, for example 2G or 500M (10^9, 10^6 bytes): fewer rows "
+           "are read at a time. The result does not depend on it")
+        ->option_text("SIZE");
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
         ->check(CLI::Range(0, 1024))
         ->capture_default_str();
@@ -134,10 +153,12 @@ void bind(CLI::App& app, Options& o) {
         "Examples:\n"
         "  vlx-krige samples.exr -o image.exr\n"
         "  vlx-krige samples.exr -o blurred.exr --method gaussian --sigma 1.5\n"
+        "  vlx-krige room_####.exr -o kriged_####.exr --frames 1-100\n"
         "Samples that are not finite are left out and counted. Regions that cannot be kriged\n"
         "get their mean and are counted.");
 }
 
+/// By the methods that hold the image whole.
 vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
                                 const vlx::Progress& progress) {
     switch (o.method) {
@@ -179,14 +200,67 @@ std::pair<int, int> parsePixel(const std::string& text) {
     return {x, y};
 }
 
-vlx::Band parseBand(const std::string& text) {
-    vlx::Band band;
-    int number = 0, end = 0;
-    if (std::sscanf(text.c_str(), "%d/%d%n", &number, &band.count, &end) != 2 ||
-        static_cast<std::size_t>(end) != text.size() || number < 1 || number > band.count)
-        throw CLI::ValidationError("--band", "expected I/N with 1 <= I <= N, found '" + text + "'");
-    band.index = number - 1;
-    return band;
+/// "2G", "500M".
+std::uint64_t parseMemory(const std::string& text) {
+    double value = 0;
+    char unit = 0;
+    int end = 0;
+    if (std::sscanf(text.c_str(), "%lf%c%n", &value, &unit, &end) != 2 ||
+        static_cast<std::size_t>(end) != text.size() || (unit != 'G' && unit != 'M') || !(value > 0) ||
+        value > 1e9)
+        throw CLI::ValidationError("--max-memory",
+                                   "expected a size such as 2G or 500M, found '" + text + "'");
+    return static_cast<std::uint64_t>(value * (unit == 'G' ? 1e9 : 1e6));
+}
+
+void kriged(const Options& o, const vlx::Progress& progress) {
+    if (!o.samplingMap.empty()) {
+        vlx::checkOutputName(o.samplingMap, {o.dump, o.image});
+        if (o.samplingMap == o.image)
+            throw CLI::ValidationError("--sampling-map", "expected another name than the output's");
+    }
+    vlx::checkOutputName(o.image, {o.dump});
+    vlx::ImageWriteOptions write;
+    write.attributes["Software"] = "vlx-krige";
+    vlx::InputsHash hash(*o.commandLine, {"DUMP"});
+    hash.addFile(o.dump);
+    const std::string inputs = write.attributes[vlx::kInputsAttribute] = hash.text(o.krige.band);
+    std::vector<std::string> outputs = {o.image};
+    if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
+    if (o.diagnostics) outputs.push_back(o.image + ".json");
+    if (!o.overwrite && vlx::isFinished(outputs, inputs)) {
+        if (o.json) std::printf("{\"skipped\": true}\n");
+        return;
+    }
+    { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
+    const vlx::DumpReader dump(o.dump);
+    vlx::ReconstructionReport report;
+    if (o.method == Method::Krige && o.filter == vlx::PixelFilter::Box && o.samplingMap.empty()) {
+        const vlx::Image outline = vlx::driftKrigingOutline(dump, o.krige);
+        vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
+        report = vlx::reconstructDriftKriging(
+            dump, o.krige, [&](const float* rows, int count) { writer.write(rows, count); }, progress);
+        hash.checkUnchanged();
+        writer.close();
+    } else {
+        vlx::Reconstruction result = reconstruct(o, dump, progress);
+        hash.checkUnchanged();
+        const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
+        if (o.diagnostics) vlx::addDiagnosticLayers(result);
+        // Both files or none: the image gets its name only when the JSON is complete.
+        std::optional<vlx::OutputFile> diagnostics;
+        if (o.diagnostics) writeText(diagnostics.emplace(o.image + ".json"), vlx::toJson(result));
+        vlx::writeImage(o.image, result.image, write);
+        if (diagnostics) diagnostics->commit();
+        if (!o.samplingMap.empty()) vlx::writeImage(o.samplingMap, map, write);
+        report = std::move(result.report);
+    }
+    if (o.json) {
+        std::printf("%s\n", vlx::toJson(report).c_str());
+    } else if (std::string text = vlx::toText(report); !text.empty()) {
+        text.pop_back();
+        vlx::say(o.image + ": " + text);
+    }
 }
 
 int run(Options& o) {
@@ -195,7 +269,7 @@ int run(Options& o) {
     o.krige.standardFeatures = !o.noFeatures;
     if (!o.band.empty()) {
         if (o.method != Method::Krige) throw CLI::ValidationError("--band goes with --method krige");
-        o.krige.band = parseBand(o.band);
+        o.krige.band = vlx::parseBand(o.band);
         if (o.filter != vlx::PixelFilter::Box)  // it reaches into the bands beside
             throw CLI::ValidationError("--band goes with --filter box");
     }
@@ -207,37 +281,32 @@ int run(Options& o) {
         throw CLI::ValidationError(
             "--diagnostics, --no-colour-distance and --whole-image go with --method paper");
 
-    if (!o.samplingMap.empty()) {
-        if (o.method == Method::Gaussian)
-            throw CLI::ValidationError("--sampling-map does not go with --method gaussian");
-        vlx::checkOutputName(o.samplingMap, {o.dump, o.image});
-        if (o.samplingMap == o.image)
-            throw CLI::ValidationError("--sampling-map", "expected another name than the output's");
+    if (!o.samplingMap.empty() && o.method == Method::Gaussian)
+        throw CLI::ValidationError("--sampling-map does not go with --method gaussian");
+    if (!o.maxMemory.empty()) {
+        if (o.method != Method::Krige || o.filter != vlx::PixelFilter::Box || !o.samplingMap.empty())
+            throw CLI::ValidationError(
+                "--max-memory goes with --method krige, --filter box and no --sampling-map");
+        o.krige.maxMemory = parseMemory(o.maxMemory);
+#ifdef __GLIBC__
+        mallopt(M_MMAP_THRESHOLD, 1 << 20);  // what is done with is given back
+#endif
     }
-    vlx::checkOutputName(o.image, {o.dump});
-    { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
     const vlx::ThreadLimit limit(o.threads);
-    const vlx::DumpReader dump(o.dump);
-    vlx::Reconstruction result = [&] {
-        vlx::ProgressBar bar("kriging");
-        return reconstruct(o, dump, bar);
-    }();
-    const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
-    if (o.diagnostics) vlx::addDiagnosticLayers(result);
-
-    vlx::ImageWriteOptions write;
-    write.attributes["Software"] = "vlx-krige";
-    // Both files or none: the image gets its name only when the JSON is complete.
-    std::optional<vlx::OutputFile> diagnostics;
-    if (o.diagnostics) writeText(diagnostics.emplace(o.image + ".json"), vlx::toJson(result));
-    vlx::writeImage(o.image, result.image, write);
-    if (diagnostics) diagnostics->commit();
-    if (!o.samplingMap.empty()) vlx::writeImage(o.samplingMap, map, write);
-
-    if (o.json)
-        std::printf("%s\n", vlx::toJson(result.report).c_str());
-    else if (!o.quiet)
-        std::fputs(vlx::toText(result.report).c_str(), stderr);
+    vlx::ProgressBar bar("kriging");
+    if (o.frames.empty()) {
+        kriged(o, bar);
+        return vlx::kDone;
+    }
+    vlx::requireFramePlace("DUMP", o.dump);
+    vlx::requireFramePlace("--output", o.image);
+    if (!o.samplingMap.empty()) vlx::requireFramePlace("--sampling-map", o.samplingMap);
+    vlx::forEachFrame(vlx::parseFrames(o.frames), bar, [&](int frame, const vlx::Progress& progress) {
+        Options one = o;
+        for (std::string* name : {&one.dump, &one.image, &one.samplingMap})
+            *name = vlx::frameName(*name, frame);
+        kriged(one, progress);
+    });
     return vlx::kDone;
 }
 

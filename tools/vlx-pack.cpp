@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iostream>
 
+#include "finished.h"
 #include "pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
@@ -107,9 +108,12 @@ struct SubsetCommand {
 struct MergeCommand {
     std::vector<std::string> parts;
     std::string output;
+    bool overwrite = false;
     vlx::MergeOptions options;
+    const CLI::App* commandLine = nullptr;
 
     void bind(CLI::App& app) {
+        commandLine = &app;
         app.description(
             "Join the parts of one picture, bands of rows or tiles, into one dump, or into one image when "
             "the "
@@ -122,14 +126,27 @@ struct MergeCommand {
             ->required();
         app.add_option("-o,--output", output, "The dump or image to write (.exr)")->required();
         app.add_flag("--crop", options.crop, "The parts need only fill a rectangle of the picture");
+        vlx::addOverwrite(app, overwrite);
     }
 
     int run() {
         parts = vlx::expandSequences(parts);
         vlx::checkOutputName(output, parts);
+        options.inputs = inputs();
+        if (!overwrite && vlx::isFinished({output}, options.inputs)) return vlx::kDone;
         vlx::ProgressBar bar("merging");
         vlx::mergeParts(parts, output, options, bar);
         return vlx::kDone;
+    }
+
+  private:
+    /// What variolux:inputs is to say: of all bands of a run what the run of the whole says.
+    std::string inputs() const {
+        const std::string whole = options.crop ? std::string() : vlx::wholeInputs(parts);
+        if (!whole.empty()) return whole;
+        vlx::InputsHash hash(*commandLine, {"PART"});
+        for (const std::string& part : parts) hash.addFile(part);
+        return hash.text();
     }
 };
 

@@ -5,9 +5,13 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "finished.h"
+#include "frames.h"
+#include "gltf_references.h"
 #include "pilot.h"
 #include "plan.h"
 #include "progress_bar.h"
@@ -15,6 +19,7 @@
 #include "scene_loader.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
+#include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
 
 namespace {
@@ -40,14 +45,22 @@ struct TraceCommand {
     double targetError = 0;
     std::string earlierPath;
     std::string mapPath;
+    std::string band;
+    std::string frames;
+    double framesPerSecond = 24;
+    std::optional<int> frame;  // of --frames, the one at work
+    bool overwrite = false;
     RenderOptions options;
+    const CLI::App* commandLine = nullptr;
 
     void bind(CLI::App& app) {
+        commandLine = &app;
         app.footer(
             "Examples:\n"
             "  vlx-trace room.glb -o room.exr --width 640 --spp 32\n"
             "  vlx-trace room.glb -o room.exr --hierarchical --tolerance 0.05 --seed 7\n"
             "  vlx-trace house.gltf -o house.exr --env sky.exr --camera kitchen --crop 100,50,64,64\n"
+            "  vlx-trace room.glb -o room_####.exr --frames 1-100 --band 2/5\n"
             "The dump is a deep OpenEXR file: its part `beauty` is the plain average, its part `samples` "
             "holds\n"
             "every sample with position, albedo, normal and depth. vlx-krige reconstructs it.");
@@ -139,6 +152,27 @@ struct TraceCommand {
             ->delimiter(',')
             ->expected(2)
             ->type_name("OPEN,CLOSE");
+        app.add_option(
+               "--band", band,
+               "Only band I of N, cut by rows from the top: the samples, bit for bit, that the whole\n"
+               "picture has there; vlx-pack merge joins them")
+            ->excludes(time)
+            ->excludes("--target-error")
+            ->type_name("I/N");
+        auto* sequence =
+            app.add_option(
+                   "--frames", frames,
+                   "Trace these frames, for example 1-100x2,150: #### in the names of files stands for\n"
+                   "the frame's number F. The shutter is moved by F / --fps seconds, the seed is a hash\n"
+                   "of --seed and F. When a frame fails the others go on")
+                ->excludes("--list-cameras")
+                ->excludes("--explain")
+                ->type_name("LIST");
+        app.add_option("--fps", framesPerSecond, "Frames a second of the scene's animations")
+            ->check(CLI::PositiveNumber)
+            ->needs(sequence)
+            ->capture_default_str();
+        vlx::addOverwrite(app, overwrite);
         app.add_option("--threads", threads, "0: all processors. The result does not depend on it")
             ->check(CLI::Range(0, 4096))
             ->capture_default_str();
@@ -152,6 +186,31 @@ struct TraceCommand {
     int run() {
         const bool renders = !listCameras && explain.empty();
         if (dump.empty() && renders) throw CLI::RequiredError("--output");
+        if (!band.empty()) options.band = vlx::parseBand(band);
+        const vlx::ThreadLimit limit(threads);
+        vlx::ProgressBar bar("tracing");
+        if (frames.empty()) return runOne(bar);
+        vlx::requireFramePlace("--output", dump);
+        vlx::forEachFrame(vlx::parseFrames(frames), bar, [&](int number, const vlx::Progress& progress) {
+            ofFrame(number).runOne(progress);
+        });
+        return vlx::kDone;
+    }
+
+  private:
+    TraceCommand ofFrame(int number) const {
+        TraceCommand one = *this;
+        for (std::string* name :
+             {&one.scene, &one.dump, &one.environment.image, &one.earlierPath, &one.mapPath})
+            *name = vlx::frameName(*name, number);
+        one.frame = number;
+        one.options.seed = vlx::hashOf(options.seed, number) >> 1;
+        return one;
+    }
+
+    /// What --frames leaves of a run: one picture.
+    int runOne(const vlx::Progress& progress) {
+        const bool renders = !listCameras && explain.empty();
         if (renders) vlx::checkOutputName(dump, {scene, earlierPath, mapPath});
         std::string broken;
         const auto request = parseEffects(effects, broken);
@@ -161,12 +220,20 @@ struct TraceCommand {
         if (!std::isfinite(exposure.open) || !std::isfinite(exposure.close) || exposure.close < exposure.open)
             throw CLI::ValidationError("--shutter",
                                        "expected two finite times, the second not before the first");
+        if (frame) {
+            exposure.open += *frame / framesPerSecond;
+            exposure.close += *frame / framesPerSecond;
+        }
         for (const float value : environmentConstant)
             if (!std::isfinite(value)) throw CLI::ValidationError("--env-constant", "expected finite values");
         if (environmentConstant.size() == 3)
             environment.constant =
                 Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
-        const vlx::ThreadLimit limit(threads);
+        std::optional<vlx::InputsHash> hash;
+        if (renders) {
+            options.inputs = hash.emplace(inputs()).text(options.band);
+            if (!overwrite && vlx::isFinished({dump}, options.inputs)) return skip();
+        }
         Scene loaded = loadScene(scene, environment, exposure);
         if (listCameras) return printCameras(loaded);
         options.camera = chosenCamera(loaded);
@@ -194,11 +261,8 @@ struct TraceCommand {
 
         const Accelerator accelerator(loaded, options.path.effects);
         if (timeLimit > 0 || targetError > 0) chooseSamples(loaded, accelerator);
-        RenderReport report;
-        {
-            vlx::ProgressBar bar("tracing");
-            report = renderDump(loaded, accelerator, dump, options, bar);
-        }
+        hash->checkUnchanged();  // all is read but the dump that is added to, which stays open
+        const RenderReport report = renderDump(loaded, accelerator, dump, options, progress);
         if (report.nonFinite > 0)
             note("warning: " + std::to_string(report.nonFinite) +
                  " samples overflowed and were written as black");
@@ -206,10 +270,24 @@ struct TraceCommand {
         return vlx::kDone;
     }
 
-  private:
-    void note(const std::string& text) const {
-        std::fprintf(stderr, "%s: %s\n", scene.c_str(), text.c_str());
+    /// Of what variolux:inputs is to say.
+    vlx::InputsHash inputs() const {
+        vlx::InputsHash hash(*commandLine, {"SCENE", "--env", "--append", "--sample-map"});
+        hash.add("scene", std::filesystem::path(scene).filename().string());  // it is in the header
+        if (frame) hash.add("frame", std::to_string(*frame));
+        for (const std::string& file : gltfFiles(scene)) hash.addFile(file);
+        for (const std::string& file : {environment.image, earlierPath, mapPath}) hash.addFile(file);
+        return hash;
     }
+
+    int skip() const {
+        if (json)
+            std::cout << nlohmann::ordered_json{{"scene", scene}, {"dump", dump}, {"skipped", true}}.dump(2)
+                      << "\n";
+        return vlx::kDone;
+    }
+
+    void note(const std::string& text) const { vlx::say(scene + ": " + text); }
 
     int printCameras(const Scene& loaded) const {
         for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
@@ -334,11 +412,13 @@ struct TraceCommand {
             if (options.hierarchical) j["refinedCells"] = report.refinedCells;
             std::cout << j.dump(2) << "\n";
         }
-        std::fprintf(stderr,
-                     "%s: %llu samples in %.2f s (%.3f Msamples/s, %d threads); compressing and writing took "
-                     "%.2f processor seconds (%.1f %% of tracing's)\n",
-                     dump.c_str(), static_cast<unsigned long long>(report.samples), seconds, rate,
-                     vlx::threadCount(), report.writeCpuSeconds, 100 * share);
+        char text[160];
+        std::snprintf(text, sizeof text,
+                      "%llu samples in %.2f s (%.3f Msamples/s, %d threads); compressing and writing took "
+                      "%.2f processor seconds (%.1f %% of tracing's)",
+                      static_cast<unsigned long long>(report.samples), seconds, rate, vlx::threadCount(),
+                      report.writeCpuSeconds, 100 * share);
+        vlx::say(dump + ": " + text);
     }
 };
 

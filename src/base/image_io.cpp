@@ -52,44 +52,91 @@ Image readImage(const std::string& path) {
     return image;
 }
 
-void writeImage(const std::string& path, const Image& image, const ImageWriteOptions& options) {
-    OutputFile file(path);
-    const auto output = OIIO::ImageOutput::create(file.temporaryPath());
+struct ImageWriter::Impl {
+    OutputFile file;
+    std::unique_ptr<OIIO::ImageOutput> output;
+    OIIO::ImageSpec spec;
+    bool exr = false;
+    // OpenEXR notices a full disk. The libraries behind other formats do not: libpng's output is cut short
+    // without a word, libjpeg ends the program. They write to memory, and the bytes are written here.
+    OIIO::Filesystem::IOVecOutput memory = {};
+    int nextRow = 0;
+
+    [[noreturn]] void fail() const {
+        throw Error(file.path(), "writing failed: " + oiioError(output->geterror()));
+    }
+};
+
+ImageWriter::ImageWriter(const std::string& path, const Window& data, const Window& display,
+                         const std::vector<std::string>& channels, const ImageWriteOptions& options)
+    : impl_(new Impl{OutputFile(path), {}, {}}) {
+    auto& output = impl_->output = OIIO::ImageOutput::create(impl_->file.temporaryPath());
     if (!output) throw Error(path, "expected an image format that can be written: " + oiioError({}));
 
-    OIIO::ImageSpec spec(image.data.width, image.data.height, image.channelCount(), OIIO::TypeDesc::FLOAT);
+    OIIO::ImageSpec& spec = impl_->spec;
+    spec = OIIO::ImageSpec(data.width, data.height, static_cast<int>(channels.size()), OIIO::TypeDesc::FLOAT);
     if (std::string_view(output->format_name()) == "png") spec.format = OIIO::TypeDesc::UINT8;
     if (options.half) spec.format = OIIO::TypeDesc::HALF;
-    spec.x = image.data.x;
-    spec.y = image.data.y;
-    spec.full_x = image.display.x;
-    spec.full_y = image.display.y;
-    spec.full_width = image.display.width;
-    spec.full_height = image.display.height;
-    spec.channelnames = image.channels;
-    const bool exr = std::string_view(output->format_name()) == "openexr";
-    if (exr) spec.attribute("compression", options.compression);
+    spec.x = data.x;
+    spec.y = data.y;
+    spec.full_x = display.x;
+    spec.full_y = display.y;
+    spec.full_width = display.width;
+    spec.full_height = display.height;
+    spec.channelnames = channels;
+    impl_->exr = std::string_view(output->format_name()) == "openexr";
+    if (impl_->exr) spec.attribute("compression", options.compression);
     // Pixels arrive as they must be stored: no library-side colour conversion of 8-bit formats.
     spec.attribute("oiio:ColorSpace", spec.format == OIIO::TypeDesc::UINT8 ? "sRGB" : "Linear");
     for (const auto& [name, value] : options.attributes) spec.attribute(name, value);
 
-    // OpenEXR notices a full disk. The libraries behind other formats do not: libpng's output is cut short
-    // without a word, libjpeg ends the program. They write to memory, and the bytes are written here.
-    OIIO::Filesystem::IOVecOutput memory;
-    if (!exr && !output->set_ioproxy(&memory))
+    if (!impl_->exr && !output->set_ioproxy(&impl_->memory))
         throw Error(path, std::string("expected an image format that can be written, found ") +
                               output->format_name());
-    if (!output->open(file.temporaryPath(), spec) ||
-        !output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) || !output->close())
-        throw Error(path, "writing failed: " + oiioError(output->geterror()));
-    if (!exr) {
-        std::ofstream bytes(file.temporaryPath(), std::ios::binary);
-        bytes.write(reinterpret_cast<const char*>(memory.buffer().data()),
-                    static_cast<std::streamsize>(memory.buffer().size()));
+    if (!output->open(impl_->file.temporaryPath(), spec)) impl_->fail();
+    impl_->nextRow = data.y;
+}
+
+ImageWriter::~ImageWriter() = default;
+
+void ImageWriter::write(const float* rows, int count) {
+    if (!impl_->output->write_scanlines(impl_->nextRow, impl_->nextRow + count, 0, OIIO::TypeDesc::FLOAT,
+                                        rows))
+        impl_->fail();
+    impl_->nextRow += count;
+}
+
+void ImageWriter::close() {
+    const int end = impl_->spec.y + impl_->spec.height;
+    if (impl_->nextRow != end)
+        throw Error(impl_->file.path(), "expected rows up to " + std::to_string(end) + ", found them up to " +
+                                            std::to_string(impl_->nextRow));
+    if (!impl_->output->close()) impl_->fail();
+    if (!impl_->exr) {
+        std::ofstream bytes(impl_->file.temporaryPath(), std::ios::binary);
+        bytes.write(reinterpret_cast<const char*>(impl_->memory.buffer().data()),
+                    static_cast<std::streamsize>(impl_->memory.buffer().size()));
         bytes.close();
-        if (!bytes) throw Error(path, "writing to disk failed");
+        if (!bytes) throw Error(impl_->file.path(), "writing to disk failed");
     }
-    file.commit();
+    impl_->file.commit();
+}
+
+void writeImage(const std::string& path, const Image& image, const ImageWriteOptions& options) {
+    ImageWriter writer(path, image.data, image.display, image.channels, options);
+    writer.write(image.pixels.data(), image.data.height);
+    writer.close();
+}
+
+std::string readTextAttribute(const std::string& path, const std::string& name) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(path, ignored)) return {};
+    const auto input = OIIO::ImageInput::open(path);
+    if (!input) {
+        OIIO::geterror();  // which is no news: it is not to be found by the next one who asks
+        return {};
+    }
+    return std::string(input->spec().get_string_attribute(name));
 }
 
 float linearToSrgb(float linear) {

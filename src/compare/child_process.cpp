@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -22,6 +23,9 @@ namespace {
 
 constexpr std::size_t kMostOutput = std::size_t{64} << 20;
 constexpr std::size_t kErrorTail = 4096;
+
+std::atomic<pid_t> runningGroup{0};
+static_assert(std::atomic<pid_t>::is_always_lock_free);
 
 /// A file descriptor, closed with it.
 class Descriptor {
@@ -88,6 +92,7 @@ ProcessRun runCommand(const std::string& command) {
     const pid_t child = ::fork();
     if (child < 0) throw Error("", std::string("cannot start a process: ") + std::strerror(errno));
     if (child == 0) {  // only async-signal-safe calls from here: other threads' locks are not ours
+        ::setpgid(0, 0);
         ::prctl(PR_SET_PDEATHSIG, SIGTERM);
         if (::getppid() != parent) ::_exit(126);
         ::dup2(nothing.get(), 0);
@@ -97,17 +102,20 @@ ProcessRun runCommand(const std::string& command) {
         ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
         ::_exit(127);
     }
+    ::setpgid(child, child);  // here too: whoever comes first
+    runningGroup = child;
     out.writeEnd.reset();
     err.writeEnd.reset();
     ProcessRun run;
     const bool complete = collect(out, err, run);
-    if (!complete) ::kill(child, SIGTERM);
+    if (!complete) ::kill(-child, SIGTERM);
     out.readEnd.reset();
     int status = 0;
     rusage usage{};
     while (::wait4(child, &status, 0, &usage) < 0)
         if (errno != EINTR)
             throw Error("", std::string("cannot wait for a process: ") + std::strerror(errno));
+    runningGroup = 0;
     run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!complete) throw Error(command, "expected at most 64 MiB of output");
     run.exitCode = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
@@ -115,6 +123,10 @@ ProcessRun runCommand(const std::string& command) {
     run.systemSeconds = secondsOf(usage.ru_stime);
     run.peakBytes = std::int64_t{usage.ru_maxrss} * 1024;
     return run;
+}
+
+void endRunningCommand() noexcept {
+    if (const pid_t group = runningGroup) ::kill(-group, SIGTERM);
 }
 
 std::string shellQuoted(const std::string& text) {

@@ -367,7 +367,10 @@ class Runner {
 
     std::string executable(const std::string& command) const {
         const std::string program = firstWord(command);
-        return shellQuoted(programs_.at(program).first) + command.substr(program.size());
+        // What is run is timed: finished work of an interrupted sweep is not to be skipped.
+        const bool skips = program == "vlx-trace" || program == "vlx-krige";
+        return shellQuoted(programs_.at(program).first) + command.substr(program.size()) +
+               (skips ? " --overwrite" : "");
     }
 
     std::string samplingKey(const std::string& command) const {

@@ -24,6 +24,7 @@
 #include "header_walker.h"
 #include "little_endian.h"
 #include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
 
 namespace vlx {
 
@@ -230,7 +231,7 @@ bool isReserved(const std::string& name) {
                                                 "view",
                                                 kWorldToCamera,
                                                 kWorldToNDC};
-    return name.starts_with("variolux:") || names.contains(name);
+    return (name.starts_with("variolux:") && name != kInputsAttribute) || names.contains(name);
 }
 
 DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {

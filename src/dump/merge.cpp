@@ -11,6 +11,7 @@
 #include "part_layout.h"
 #include "raw_file.h"
 #include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
 
@@ -113,6 +114,8 @@ MergeReport mergeDumps(const std::vector<std::string>& paths, const std::string&
     DumpHeader header = first.header();
     header.data = options.crop ? boundsOf(parts) : header.display;
     header.renderSeconds.reset();  // close() records it
+    header.extra.erase(kInputsAttribute);
+    if (!options.inputs.empty()) header.extra[kInputsAttribute] = options.inputs;
     arrangeParts(parts, header.data, output);
 
     DumpWriter writer(output, header);
@@ -141,16 +144,48 @@ MergeReport mergeDumps(const std::vector<std::string>& paths, const std::string&
     return {header.data, true};
 }
 
+std::string inputsOf(const std::string& part) {
+    if (!isDeep(part)) return flatInputs(part);
+    const DumpReader reader(part);
+    const auto found = reader.header().extra.find(kInputsAttribute);
+    return found == reader.header().extra.end() ? std::string() : found->second;
+}
+
 }  // namespace
 
+std::string wholeInputs(const std::vector<std::string>& parts) {
+    std::string run, runOf;  // of the bands, and the first of them
+    bool allBands = true;
+    for (const std::string& part : parts) {
+        const std::string inputs = inputsOf(part);
+        const std::size_t end = inputs.find(" band ");
+        if (end == std::string::npos) {
+            allBands = false;
+            continue;
+        }
+        const std::string found = inputs.substr(0, end);
+        if (runOf.empty()) {
+            run = found;
+            runOf = part;
+        }
+        if (found != run)
+            throw Error(part, "expected a band of the run " + run + " as " + runOf + " is, found one of " +
+                                  found + ": other inputs or parameters");
+    }
+    return allBands ? run : std::string();
+}
+
 MergeReport mergeParts(const std::vector<std::string>& parts, const std::string& output,
-                       const MergeOptions& options, const Progress& progress) {
+                       const MergeOptions& asked, const Progress& progress) {
     if (parts.empty()) throw Error(output, "expected parts to merge, found none");
     const bool deep = isDeep(parts.front());
     for (const auto& part : parts)
         if (isDeep(part) != deep)
             throw Error(part, std::string("expected ") + (deep ? "a dump" : "a flat image") + " like " +
                                   parts.front() + ", found " + (deep ? "a flat image" : "a dump"));
+    MergeOptions options = asked;
+    const std::string whole = wholeInputs(parts);
+    if (!options.crop && !whole.empty()) options.inputs = whole;
     return deep ? mergeDumps(parts, output, options, progress) : mergeFlat(parts, output, options, progress);
 }
 

@@ -12,6 +12,7 @@
 #include "flat_images.h"
 #include "part_layout.h"
 #include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
 
 namespace vlx {
@@ -66,6 +67,10 @@ void checkSamePicture(const std::string& firstPath, const OIIO::ImageSpec& first
 
 }  // namespace
 
+std::string flatInputs(const std::string& path) {
+    return std::string(open(path)->spec().get_string_attribute(kInputsAttribute));
+}
+
 MergeReport mergeFlat(const std::vector<std::string>& paths, const std::string& output,
                       const MergeOptions& options, const Progress& progress) {
     OIIO::ImageSpec spec = open(paths.front())->spec();
@@ -81,6 +86,8 @@ MergeReport mergeFlat(const std::vector<std::string>& paths, const std::string& 
     spec.y = whole.y;
     spec.width = whole.width;
     spec.height = whole.height;
+    spec.erase_attribute(kInputsAttribute);
+    if (!options.inputs.empty()) spec.attribute(kInputsAttribute, options.inputs);
     const std::uint64_t pixelBytes = spec.pixel_bytes(true);
     const std::uint64_t rowBytes = pixelBytes * static_cast<std::uint64_t>(whole.width);
     if (rowBytes * kBandRows > kMaxBandBytes)

@@ -9,6 +9,7 @@
 
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
+#include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
 
@@ -115,6 +116,7 @@ SubsetReport subsetDump(const std::string& input, const std::string& output, con
     const auto replicates = chooseReplicates(reader, options);
 
     DumpHeader header = reader.header();
+    header.extra.erase(kInputsAttribute);  // of the whole dump
     const Window window = header.data;
     header.compression = options.compression;
     const std::optional<double> renderSeconds = header.renderSeconds;

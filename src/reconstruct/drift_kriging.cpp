@@ -22,8 +22,19 @@ constexpr int kFireflyReach = 2;         // pixels: the neighbourhood of a firef
 constexpr int kHoleReach = 5;            // pixels: how far a pixel without samples looks for some
 constexpr int kStackReach = 10;          // pixels: triangular window of 21 x 21 pixels
 constexpr double kMeanSignificance = 1;  // standard errors by which the plain mean must improve
-// Rows kept of everything: a tile row, and all that its stages look ahead and back, rounded up.
-constexpr int kRowsKept = 192;
+// Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them. With
+// tiles of 32 rows, centres that reach 15 and patches that reach 3, data are filled 160 rows ahead of the row
+// that is combined; the others are used up earlier.
+constexpr int kDataRows = 192;
+constexpr int kGatheredRows = 128;
+constexpr int kFeatureRows = 128;  // and variances
+constexpr int kSumRows = 128;
+constexpr int kEstimateRows = 64;  // and moments
+
+// What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries that it
+// maps, and each thread's tiles.
+constexpr std::uint64_t kProcessBytes = 150'000'000;
+constexpr std::uint64_t kThreadBytes = 8'000'000;
 
 constexpr std::pair<int, int> kNeighbours[] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
 
@@ -40,9 +51,8 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
     return {{8, 0.8f, 4, true}, {15, 3.f, 5, false}, {4, 1.f, 3, false}};
 }
 
-/// First row of a band of an image of `height` rows.
-int bandRow(const Band& band, int height) {
-    return static_cast<int>(static_cast<std::int64_t>(height) * band.index / band.count);
+Window scaled(const Window& window, int scale) {
+    return {window.x * scale, window.y * scale, window.width * scale, window.height * scale};
 }
 
 class Stopwatch {
@@ -62,21 +72,24 @@ class Stopwatch {
 /// needs.
 class Pipeline {
   public:
-    Pipeline(const DumpReader& dump, const DriftKrigingOptions& options, const Progress& progress)
+    Pipeline(const DumpReader& dump, const DriftKrigingOptions& options, const RowSink& sink,
+             const Progress& progress)
         : dump_(dump),
           options_(options),
+          sink_(sink),
           progress_(progress),
           layout_(chooseSampleLayout(dump, options)),
           planes_(layout_),
           models_(modelsOf(options.quality)),
           width_(dump.header().data.width * options.scale),
           height_(dump.header().data.height * options.scale),
+          readRows_(kReadRows / options.scale),
           radiance_(layout_.radiance),
-          gathered_(width_, planes_.channels, kRowsKept),
-          data_(width_, 2 * radiance_ + 3, kRowsKept),
-          squares_(width_, 4, kRowsKept),
-          features_(width_, 2 * layout_.features, kRowsKept),
-          variances_(width_, 3, kRowsKept) {
+          gathered_(width_, planes_.channels, kGatheredRows),
+          data_(width_, 2 * radiance_ + 4, kDataRows),
+          squares_(width_, 4, kDataRows),
+          features_(width_, 2 * layout_.features, kFeatureRows),
+          variances_(width_, 3, kFeatureRows) {
         if (layout_.features + 5 > kMaxRandomDrift || radiance_ > kMaxRandomDrift)
             throw Error(dump.path(), "expected at most " + std::to_string(kMaxRandomDrift - 5) +
                                          " features and " + std::to_string(kMaxRandomDrift) +
@@ -84,37 +97,29 @@ class Pipeline {
                                          " and " + std::to_string(radiance_));
         const EstimatePlanes planes{radiance_};
         for (std::size_t m = 0; m < models_.size(); ++m) {
-            sums_.emplace_back(width_, planes.channels(), kRowsKept);
-            estimates_.emplace_back(width_, 2 * radiance_ + 3, kRowsKept);
+            sums_.emplace_back(width_, planes.channels(), kSumRows);
+            estimates_.emplace_back(width_, 2 * radiance_ + 3, kEstimateRows);
         }
         const int candidates = static_cast<int>(models_.size());  // models but one, and the mean
         momentPlanes_ = candidates * (candidates + 1) / 2 + 2 * candidates;
-        moments_ = RowRing(width_, momentPlanes_, kRowsKept);
-        std::vector<std::string> channels(layout_.names.begin(), layout_.names.begin() + radiance_);
-        for (const char* name : {"stddev.R", "stddev.G", "stddev.B"}) channels.emplace_back(name);
-        Window window = scaled(dump.header().data);
-        firstRow_ = bandRow(options.band, window.height);
-        endRow_ = bandRow({options.band.index + 1, options.band.count}, window.height);
-        window.y += firstRow_;
-        window.height = endRow_ - firstRow_;
-        if (window.height == 0)
-            throw Error(dump.path(), "expected at least as many rows as bands, found " +
-                                         std::to_string(height_) + " rows and " +
-                                         std::to_string(options.band.count) + " bands");
-        result_.image = Image(window, std::move(channels));
-        result_.image.display = scaled(dump.header().display);
+        moments_ = RowRing(width_, momentPlanes_, kEstimateRows);
+        const Window window = driftKrigingOutline(dump, options).data;
+        firstRow_ = window.y - scaled(dump.header().data, options.scale).y;
+        endRow_ = firstRow_ + window.height;
+        rows_ =
+            Image({0, 0, width_, kTile}, std::vector<std::string>(static_cast<std::size_t>(radiance_ + 3)));
+        if (options.maxMemory > 0) limitRowsRead();
         startAbove(firstRow_);
     }
 
-    Reconstruction run() {
+    ReconstructionReport run() {
         while (combinedRows_ < endRow_) {
             combine(std::min(endRow_, combinedRows_ + kTile));
             if (progress_) progress_(combinedRows_ - firstRow_, endRow_ - firstRow_);
         }
-        ReconstructionReport& report = result_.report;
-        for (const auto& [stage, seconds] : report.seconds)
-            (stage == "read" ? report.readSeconds : report.solveSeconds) += seconds;
-        return std::move(result_);
+        for (const auto& [stage, seconds] : report_.seconds)
+            (stage == "read" ? report_.readSeconds : report_.solveSeconds) += seconds;
+        return std::move(report_);
     }
 
   private:
@@ -132,9 +137,39 @@ class Pipeline {
         gatheredRows_ = std::max(0, dataRows_ - kHoleReach) / options_.scale * options_.scale;
     }
 
-    Window scaled(const Window& window) const {
-        const int s = options_.scale;
-        return {window.x * s, window.y * s, window.width * s, window.height * s};
+    /// Chooses how many rows are read at a time by options_.maxMemory and the fullest row of the dump.
+    void limitRowsRead() {
+        const Window& data = dump_.header().data;
+        std::uint64_t samples = 0;
+        for (int y = data.y; y < data.y + data.height; ++y) {
+            std::uint64_t ofRow = 0;
+            for (const std::uint32_t n : dump_.counts(y, 1)) ofRow += n;
+            samples = std::max(samples, ofRow);
+        }
+        std::uint64_t rings = rows_.pixels.size() * sizeof(float);
+        for (const RowRing* ring : {&gathered_, &data_, &squares_, &features_, &variances_, &moments_})
+            rings += ring->bytes();
+        for (const auto* list : {&sums_, &estimates_})
+            for (const RowRing& ring : *list) rings += ring.bytes();
+        const std::uint64_t held =
+            kProcessBytes + rings + kThreadBytes * static_cast<std::uint64_t>(threadCount());
+        // The values of a row, twice where they are sorted into parts of pixels; and, on each thread that
+        // unpacks one, all its channels packed and unpacked.
+        const auto width = static_cast<std::uint64_t>(data.width);
+        const std::uint64_t values =
+            (samples * layout_.names.size() * 4 + width * 16) * (options_.scale > 1 ? 2 : 1);
+        const std::uint64_t unpacking = samples * dump_.header().channels.size() * 8 + width * 8;
+        const auto needed = [&](int rows) {
+            return held + static_cast<std::uint64_t>(rows) * values +
+                   static_cast<std::uint64_t>(std::min(rows, threadCount())) * unpacking;
+        };
+        readRows_ = kReadRows / options_.scale;
+        while (readRows_ > 1 && needed(readRows_) > options_.maxMemory) --readRows_;
+        if (needed(readRows_) > options_.maxMemory)
+            throw Error(dump_.path(), "expected a memory limit of at least " +
+                                          std::to_string((needed(readRows_) + 999'999) / 1'000'000) +
+                                          "M for rows as wide and full as these, found " +
+                                          std::to_string(options_.maxMemory / 1'000'000) + "M");
     }
 
     bool own(int y) const { return y >= firstRow_ && y < endRow_; }
@@ -145,14 +180,14 @@ class Pipeline {
         until = std::min(until, height_);
         while (gatheredRows_ < until) {
             const int scale = options_.scale, first = gatheredRows_;
-            const int sourceRows = std::min(kReadRows / scale, (height_ - first) / scale);
+            const int sourceRows = std::min(readRows_, (height_ - first) / scale);
             const int rows = sourceRows * scale;
             SampleBand band = dump_.read(dump_.header().data.y + first / scale, sourceRows, layout_.names);
             if (scale > 1) {
                 const auto position = static_cast<std::size_t>(layout_.position);
                 band = rebin(band, scale, position, position + 1);
             }
-            watch_.addTo(result_.report.seconds["read"]);
+            watch_.addTo(report_.seconds["read"]);
             std::vector<GatherCounts> counts(static_cast<std::size_t>(rows));
             const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;
             parallelFor(0, rows, [&](std::int64_t row) {
@@ -160,7 +195,7 @@ class Pipeline {
                     gatherRow(band, layout_, planes_, static_cast<int>(row), clamp, gathered_,
                               first + static_cast<int>(row));
             });
-            ReconstructionReport& report = result_.report;
+            ReconstructionReport& report = report_;
             for (int row = 0; row < rows; ++row) {
                 if (!own(first + row)) continue;
                 const GatherCounts& of = counts[static_cast<std::size_t>(row)];
@@ -198,12 +233,12 @@ class Pipeline {
         for (int y = first; y < until; ++y) {
             if (!own(y)) continue;
             const Removed& of = removed[static_cast<std::size_t>(y - first)];
-            result_.report.limitedSamples += of.samples;
+            report_.limitedSamples += of.samples;
             removed_ += of.luminance;
         }
-        result_.report.energyRemoved = luminance_ > 0 ? removed_ / luminance_ : 0;
+        report_.energyRemoved = luminance_ > 0 ? removed_ / luminance_ : 0;
         dataRows_ = until;
-        watch_.addTo(result_.report.seconds["statistics"]);
+        watch_.addTo(report_.seconds["statistics"]);
     }
 
     /// A pixel without samples gets the means and features of the nearest one that has some, so that it is
@@ -265,6 +300,16 @@ class Pipeline {
         if (n == 1 && freedom == 0) borrowSquares(x, y, squares, freedom);
         for (int c = 0; c < 3; ++c) squares_.row(c, y)[x] = squares[c];
         squares_.row(3, y)[x] = freedom;
+        data_.row(2 * radiance_ + 3, y)[x] = isExact(x, y) ? 1 : 0;
+    }
+
+    bool isExact(int x, int y) const {
+        if (layout_.features == 0 || squares_.row(3, y)[x] < 1) return false;
+        for (int c = 0; c < 3; ++c)
+            if (squares_.row(c, y)[x] > 0) return false;
+        for (int f = 0; f < layout_.features; ++f)
+            if (gathered_.row(planes_.featureError + f, y)[x] > 0) return false;
+        return true;
     }
 
     /// Mean of a half. Where a pixel has no sample of it, what its neighbours have on average stands in, with
@@ -335,7 +380,7 @@ class Pipeline {
                                   height_, features_);
             });
             featureRows_ = std::min(height_, featureRows_ + kTile);
-            watch_.addTo(result_.report.seconds["features"]);
+            watch_.addTo(report_.seconds["features"]);
         }
     }
 
@@ -349,7 +394,7 @@ class Pipeline {
                             variances_);
         });
         varianceRows_ = until;
-        watch_.addTo(result_.report.seconds["variances"]);
+        watch_.addTo(report_.seconds["variances"]);
     }
 
     /// Neighbourhoods centred in rows up to `until`.
@@ -376,7 +421,7 @@ class Pipeline {
                     counts[static_cast<std::size_t>(tile)] =
                         krigeTile(input, models_, tile * kTile, y, sums_);
                 });
-            ReconstructionReport& report = result_.report;
+            ReconstructionReport& report = report_;
             for (const NeighbourhoodCounts& of : counts) {
                 report.neighbourhoods += of.neighbourhoods;
                 report.ownNeighbourhoods += of.own;
@@ -400,7 +445,7 @@ class Pipeline {
             momentsRow(static_cast<int>(y));
         });
         finishedRows_ = until;
-        watch_.addTo(result_.report.seconds["combining"]);
+        watch_.addTo(report_.seconds["combining"]);
     }
 
     void finishRow(std::size_t m, int y) {
@@ -515,9 +560,11 @@ class Pipeline {
         parallelFor(combinedRows_, until, [&](std::int64_t y) {
             exact[static_cast<std::size_t>(y - combinedRows_)] = combineRow(static_cast<int>(y));
         });
-        for (const std::int64_t of : exact) result_.report.exactPixels += of;
+        for (const std::int64_t of : exact) report_.exactPixels += of;
+        watch_.addTo(report_.seconds["combining"]);
+        sink_(rows_.pixels.data(), until - combinedRows_);
         combinedRows_ = until;
-        watch_.addTo(result_.report.seconds["combining"]);
+        watch_.addTo(report_.seconds["output"]);
     }
 
     std::int64_t combineRow(int y) {
@@ -559,10 +606,10 @@ class Pipeline {
 
     void store(int x, int y, const Eigen::VectorXd& weights, std::int64_t& exact) {
         const int m = candidates();
-        float* out = result_.image.at(x, y - firstRow_);
+        float* out = rows_.at(x, y - combinedRows_);
         const float nA = data_.row(2 * radiance_, y)[x], nB = data_.row(2 * radiance_ + 1, y)[x];
         const float n = data_.row(2 * radiance_ + 2, y)[x];
-        const bool known = isExact(x, y);
+        const bool known = data_.row(2 * radiance_ + 3, y)[x] > 0;
         exact += known;
         for (int c = 0; c < radiance_; ++c) {
             const double mean =
@@ -615,24 +662,16 @@ class Pipeline {
         return sum / count;
     }
 
-    bool isExact(int x, int y) const {
-        if (layout_.features == 0 || squares_.row(3, y)[x] < 1) return false;
-        for (int c = 0; c < 3; ++c)
-            if (squares_.row(c, y)[x] > 0) return false;
-        for (int f = 0; f < layout_.features; ++f)
-            if (gathered_.row(planes_.featureError + f, y)[x] > 0) return false;
-        return true;
-    }
-
     const DumpReader& dump_;
     const DriftKrigingOptions& options_;
+    const RowSink& sink_;
     const Progress& progress_;
     SampleLayout layout_;
     GatheredPlanes planes_;
     std::vector<NeighbourhoodModel> models_;
-    int width_, height_, radiance_, momentPlanes_ = 0;
+    int width_, height_, readRows_, radiance_, momentPlanes_ = 0;
     RowRing gathered_;
-    RowRing data_;     // means of A, means of B, counts of A, B, both
+    RowRing data_;     // means of A, means of B, counts of A, B, both; whether exact
     RowRing squares_;  // sums of squares of R, G, B; their degrees of freedom
     RowRing features_, variances_;
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: A, B, spread of R, G, B
@@ -642,7 +681,8 @@ class Pipeline {
         zeroedRows_ = 0, finishedRows_ = 0, combinedRows_ = 0;
     double luminance_ = 0, removed_ = 0;
     Stopwatch watch_;
-    Reconstruction result_;
+    Image rows_;  // finished, on their way out
+    ReconstructionReport report_;
 };
 
 }  // namespace
@@ -659,10 +699,42 @@ std::optional<std::string> DriftKrigingOptions::validate() const {
     return std::nullopt;
 }
 
+Image driftKrigingOutline(const DumpReader& dump, const DriftKrigingOptions& options) {
+    Image image;
+    image.data = bandOf(scaled(dump.header().data, options.scale), options.band);
+    if (image.data.height == 0)
+        throw Error(dump.path(), "expected at least as many rows as bands, found " +
+                                     std::to_string(dump.header().data.height * options.scale) +
+                                     " rows and " + std::to_string(options.band.count) + " bands");
+    image.display = scaled(dump.header().display, options.scale);
+    image.channels = {"R", "G", "B"};
+    if (findChannel(dump.header(), "A") >= 0) image.channels.emplace_back("A");
+    image.channels.insert(image.channels.end(), options.radiance.begin(), options.radiance.end());
+    for (const char* name : {"stddev.R", "stddev.G", "stddev.B"}) image.channels.emplace_back(name);
+    return image;
+}
+
+ReconstructionReport reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
+                                             const RowSink& sink, const Progress& progress) {
+    if (const auto broken = options.validate()) throw Error("", *broken);
+    return Pipeline(dump, options, sink, progress).run();
+}
+
 Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
                                        const Progress& progress) {
     if (const auto broken = options.validate()) throw Error("", *broken);
-    return Pipeline(dump, options, progress).run();
+    const Image outline = driftKrigingOutline(dump, options);
+    Reconstruction result;
+    result.image = Image(outline.data, outline.channels);
+    result.image.display = outline.display;
+    int row = 0;
+    const auto keep = [&](const float* rows, int count) {
+        std::copy(rows, rows + std::ptrdiff_t{count} * outline.data.width * outline.channelCount(),
+                  result.image.at(0, row));
+        row += count;
+    };
+    result.report = reconstructDriftKriging(dump, options, keep, progress);
+    return result;
 }
 
 }  // namespace vlx

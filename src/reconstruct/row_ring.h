@@ -18,6 +18,7 @@ class RowRing {
           values_(width_ * static_cast<std::size_t>(channels) * static_cast<std::size_t>(capacity)) {}
 
     int channels() const { return channels_; }
+    std::size_t bytes() const { return values_.size() * sizeof(float); }
 
     float* row(int channel, int y) { return values_.data() + offset(channel, y); }
     const float* row(int channel, int y) const { return values_.data() + offset(channel, y); }

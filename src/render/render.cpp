@@ -7,7 +7,9 @@
 #include <ctime>
 #include <limits>
 
+#include "variolux/base/error.h"
 #include "variolux/base/hash.h"
+#include "variolux/base/image_io.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/writer.h"
 
@@ -50,6 +52,7 @@ PlanOptions planOptions(const RenderOptions& options) {
         options.camera, options.width, options.height, options.path.maxBounces, {.all = true, .without = {}}};
 }
 
+/// Of the whole picture, whatever the band.
 DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& options) {
     DumpHeader header;
     header.display = {0, 0, options.width, options.height};
@@ -77,6 +80,7 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
         if (plan.leftOut.has(e.effect))
             leftOut += (leftOut.empty() ? "" : ",") + std::string(nameOf(e.effect));
     if (!leftOut.empty()) header.extra["effectsLeftOut"] = leftOut;
+    if (!options.inputs.empty()) header.extra[kInputsAttribute] = options.inputs;
     header.seed = static_cast<std::int64_t>(options.seed);
     if (!options.hierarchical) header.samples = options.spp;
     if (options.earlier != nullptr) {
@@ -124,6 +128,7 @@ class BandTracer {
           view_(view),
           options_(options),
           header_(header),
+          whole_(options.crop.value_or(header.display)),
           lens_(options.path.effects.has(Effect::DepthOfField)),
           time_(options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion})),
           seed_(options.seed),
@@ -179,6 +184,13 @@ class BandTracer {
         }
     }
 
+    PathSample traced(const CameraSample& s) const {
+        const PathSampler sampler(s.seed, s.index);
+        const Vec2 lens = lens_ ? sampler.pair(dimension::kLens) : Vec2{};
+        const float time = time_ ? sampler.pair(dimension::kTime).x : 0;
+        return tracer_.trace(view_.ray(s.x, s.y, lens, time), sampler);
+    }
+
     /// Into the region's records, or straight into the band.
     void traceRegion(int rx, int ry, const Window& rows, RegionResult& out,
                      const ChannelArrays* direct) const {
@@ -188,14 +200,13 @@ class BandTracer {
         out.nonFinite = 0;
         const int left = rx * kRegionSize, top = ry * kRegionSize;
         const Shade shade = [&](const CameraSample& s) {
-            const PathSampler sampler(s.seed, s.index);
-            const Vec2 lens = lens_ ? sampler.pair(dimension::kLens) : Vec2{};
-            const float time = time_ ? sampler.pair(dimension::kTime).x : 0;
-            PathSample sample = tracer_.trace(view_.ray(s.x, s.y, lens, time), sampler);
+            PathSample sample = traced(s);
+            const bool outside = !rows.contains(s.column, s.row);  // of the band: another band's sample
             if (!isFinite(sample.radiance)) {
-                ++out.nonFinite;
+                out.nonFinite += !outside;
                 sample.radiance = {};
             }
+            if (outside) return sample.radiance;
             const int pixel = (s.row - top) * kRegionSize + (s.column - left);
             const std::uint32_t number = out.counts[static_cast<std::size_t>(pixel)]++;
             const Record record{pixel, s.x, s.y, s.replicate, sample};
@@ -208,7 +219,9 @@ class BandTracer {
             return sample.radiance;
         };
         if (options_.hierarchical) {
-            out.refined = sampleHierarchically(out.window, rx, ry, options_.refinement, options_.seed, shade);
+            // All that the whole picture has of the region: it says where cells are refined.
+            out.refined = sampleHierarchically(clipped(rx, ry, whole_), rx, ry, options_.refinement,
+                                               options_.seed, shade);
         } else if (options_.map != nullptr) {
             const auto countAt = [&](int x, int y) {
                 return options_.map->samplesAt(x, y, options_.spp, seed_);
@@ -252,6 +265,7 @@ class BandTracer {
     const View& view_;
     const RenderOptions& options_;
     const DumpHeader& header_;
+    Window whole_;  // the picture's part, whatever the band
     bool lens_;
     bool time_;
     std::uint64_t seed_;
@@ -285,6 +299,8 @@ std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
                std::to_string(scene.cameras.size());
     const Camera& c = scene.cameras[camera];
     if (!c.unusable.empty()) return "camera '" + c.name + "' cannot be used: " + c.unusable;
+    if (band.count < 1 || band.index < 0 || band.index >= band.count)
+        return "band must be one of 1 to its number of bands";
     if (spp < 1 || spp > 1 << 24) return "spp must be 1 to 2^24";
     if (seed > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
         return "seed must be less than 2^63";
@@ -305,9 +321,12 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     assert(!options.validate(scene));
     const View view(scene.cameras[options.camera], options.width, options.height);
     const PathTracer tracer(scene, accelerator, options.path);
-    const DumpHeader header = headerOf(scene, view, options);
-    const Window& window = header.data;
+    DumpHeader header = headerOf(scene, view, options);
     if (options.earlier != nullptr) options.earlier->checkSameView(header);
+    const Window window = header.data = bandOf(header.data, options.band);
+    if (window.height == 0)
+        throw Error(path, "expected at most as many bands as rows, found " +
+                              std::to_string(options.band.count) + " bands");
     DumpWriter writer(path, header);
     BandTracer bands(tracer, view, options, header);
 
@@ -346,8 +365,9 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
         writer.write(options.earlier != nullptr ? options.earlier->before(band) : std::move(band));
         y = end;
     }
-    const double before =
-        options.earlier != nullptr ? options.earlier->header().renderSeconds.value_or(0) : 0;
+    // Merging adds the bands' seconds up: the first one has the earlier ones.
+    const bool first = options.earlier != nullptr && options.band.index == 0;
+    const double before = first ? options.earlier->header().renderSeconds.value_or(0) : 0;
     writer.close(before + report.traceSeconds);
     report.writeCpuSeconds = writer.cpuSeconds();
     report.traceCpuSeconds =

@@ -20,6 +20,7 @@ struct RenderOptions {
     int width = 512;  ///< of the whole picture, in pixels
     int height = 512;
     std::optional<Window> crop;  ///< the part to render; inside the picture
+    Band band;                   ///< only these rows of that: the samples that the whole has there
     std::size_t camera = 0;      ///< index into the scene's cameras
     int spp = 16;                ///< samples in each pixel, when uniform
     int replicates = 1;          ///< independent randomisations that share spp; > 1 adds sample.replicate
@@ -31,6 +32,7 @@ struct RenderOptions {
     PathOptions path;
     DumpCompression compression = DumpCompression::Rle;
     std::string version;       ///< of the program, for the header
+    std::string inputs;        ///< for the header's kInputsAttribute (base/image_io.h)
     std::optional<Plan> plan;  ///< set by follow()
 
     /// Adopts a plan, which applyPlan is to apply to the scene too.
@@ -51,8 +53,10 @@ struct RenderReport {
 
 /// Renders a scene into a dump. Works in bands of at most 16 rows: one is traced while the ones before are
 /// written, and memory does not grow with the picture's height. A sample depends on (seed, pixel, index)
-/// only: the file is the same, byte for byte, for any number of threads. Throws Error when the file cannot be
-/// written.
+/// only: the file is the same, byte for byte, for any number of threads, and bands merge into the whole's
+/// file. What is sampled hierarchically is sampled by whole regions of 4 x 4 pixels: those that a band's
+/// border cuts are traced, and their refined cells counted, for both bands. Throws Error when there are more
+/// bands than rows and when the file cannot be written.
 RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, const std::string& path,
                         const RenderOptions& options, const Progress& progress = {});
 

@@ -35,7 +35,8 @@ TEST(VlxKrige, SamePixelsForAnyNumberOfThreads) {
     for (const char* method : {"krige", "paper", "mean", "gaussian"}) {
         Image first;
         for (const char* threads : {"1", "2", "8"}) {
-            ASSERT_EQ(krige({kDump, "-o", folder / "out.exr", "--method", method, "--threads", threads, "-q"})
+            ASSERT_EQ(krige({kDump, "-o", folder / "out.exr", "--method", method, "--threads", threads, "-q",
+                             "--overwrite"})
                           .exitCode,
                       0);
             const Image image = readImage(folder / "out.exr");

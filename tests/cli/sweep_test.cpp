@@ -1,8 +1,10 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -320,6 +322,38 @@ TEST(VlxCompareSweep, BadUsageIsExitTwo) {
     }
     EXPECT_EQ(folder.entries(), 0);
     EXPECT_EQ(sweep({"--help"}).exitCode, 0);
+}
+
+TEST(VlxCompareSweep, EndsWhatItStartedWhenItIsEnded) {
+    const TemporaryFolder folder;
+    const std::string pids = folder / "pids";
+    const std::string program = std::string(VLX_BIN) + "/vlx-compare";
+    const std::string slow =
+        "slow=sleep 100 & echo $! $$ > " + pids + ".part; mv " + pids + ".part " + pids + "; wait";
+    const pid_t child = ::fork();
+    if (child == 0) {
+        ::execl(program.c_str(), program.c_str(), "sweep", kDump.c_str(), "-o", (folder / "out").c_str(),
+                "--methods", "mean", "--no-vary", "--spp", "2", "--trace-seconds", "1", "-q", "--external",
+                slow.c_str(), nullptr);
+        ::_exit(127);
+    }
+    const auto eventually = [](const auto& condition) {
+        for (int i = 0; i < 3000 && !condition(); ++i) ::usleep(10'000);
+        return condition();
+    };
+    ASSERT_TRUE(eventually([&] { return std::filesystem::exists(pids); }));
+    ::kill(child, SIGTERM);
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM) << status;
+    std::ifstream file(pids);
+    for (pid_t started = 0; file >> started;)
+        EXPECT_TRUE(eventually([&] {
+            std::ifstream state("/proc/" + std::to_string(started) + "/stat");
+            std::string text;
+            return !std::getline(state, text) || text.find(") Z") != std::string::npos;
+        })) << started
+            << " is still there";
 }
 
 }  // namespace

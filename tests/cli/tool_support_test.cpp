@@ -2,6 +2,7 @@
 
 #include <sstream>
 
+#include "frames.h"
 #include "help_formatter.h"
 #include "man_page.h"
 
@@ -57,6 +58,45 @@ TEST(ManPage, HoldsOptionsCommandsAndExamplesThatRoffTakesAsTheyAre) {
                              ".nf\nExample:\n  tool command 'a' \\-\\-flag\n.fi\n"})
         EXPECT_NE(page.find(part), std::string::npos) << part << "\nin\n" << page;
     EXPECT_EQ(page.find("hidden"), std::string::npos);
+}
+
+TEST(ParseFrames, ListsRangesAndSteps) {
+    EXPECT_EQ(parseFrames("7"), std::vector<int>({7}));
+    EXPECT_EQ(parseFrames("1-3,7,10-20x5"), std::vector<int>({1, 2, 3, 7, 10, 15, 20}));
+    EXPECT_EQ(parseFrames("1-6x2"), std::vector<int>({1, 3, 5}));
+    EXPECT_EQ(parseFrames("5,1-6x4"), std::vector<int>({5, 1})) << "each once, in this order";
+    for (const char* text :
+         {"", ",", "1,", "a", "1-", "-1", "3-1", "1-3x0", "1-3x", "1x2", "1-3 ", "99999999999", "0-2000000"})
+        EXPECT_THROW(parseFrames(text), CLI::ValidationError) << text;
+}
+
+TEST(ParseBand, CountsFromOne) {
+    const Band band = parseBand("2/5");
+    EXPECT_EQ(band.index, 1);
+    EXPECT_EQ(band.count, 5);
+    for (const char* text : {"0/2", "3/2", "1", "1/2x", "a/b", "-1/2", "1/", "/2"})
+        EXPECT_THROW(parseBand(text), CLI::ValidationError) << text;
+}
+
+TEST(FrameName, PutsTheNumberInPlaceOfEachRun) {
+    EXPECT_EQ(frameName("a_####.exr", 12), "a_0012.exr");
+    EXPECT_EQ(frameName("a_##.exr", 123), "a_123.exr");
+    EXPECT_EQ(frameName("x#/a#b##.exr", 5), "x#/a5b05.exr") << "folders stay";
+    EXPECT_EQ(frameName("a.exr", 5), "a.exr");
+}
+
+TEST(BandOf, CutsAllRowsInOrder) {
+    for (const int height : {1, 7, 64, 2160})
+        for (const int count : {1, 2, 3, 7}) {
+            int next = -3;
+            for (int i = 0; i < count; ++i) {
+                const Window band = bandOf({5, -3, 9, height}, {i, count});
+                EXPECT_EQ(band.y, next);
+                EXPECT_NEAR(band.height, static_cast<double>(height) / count, 1);
+                next += band.height;
+            }
+            EXPECT_EQ(next, -3 + height);
+        }
 }
 
 }  // namespace

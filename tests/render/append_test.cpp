@@ -122,6 +122,41 @@ TEST_F(Appending, AMapSaysWhereTheSamplesGo) {
     EXPECT_NEAR(static_cast<double>(bands[0].samples()), 5 * 21 * 18, 40);
 }
 
+// The samples that a band gets, where they depend on the whole picture: of a map, and added to a dump.
+TEST_F(Appending, BandsAreTheRowsOfTheWhole) {
+    map([](int x, int y) { return static_cast<float>((x + 3 * y) % 5); });
+    const SampleMap map(folder / "map.exr", {0, 0, 21, 18});
+    RenderOptions options = small();
+    options.replicates = 2;
+    render("old.exr", options);
+    const EarlierDump earlier(folder / "old.exr");
+    RenderOptions more = small();
+    more.map = &map;
+    more.earlier = &earlier;
+    for (RenderOptions of : {options, more}) {
+        render("whole.exr", of);
+        const SampleBand whole = samplesOf(folder / "whole.exr");
+        std::vector<std::uint64_t> offsets = {0};
+        std::vector<std::vector<float>> values(whole.values.size());
+        for (int i = 0; i < 4; ++i) {  // at rows 4, 9, 13: not those of regions
+            of.band = {i, 4};
+            render("band.exr", of);
+            const DumpReader reader(folder / "band.exr");
+            EXPECT_EQ(reader.header().samples, DumpReader(folder / "whole.exr").header().samples);
+            const SampleBand band = samplesOf(folder / "band.exr");
+            const std::uint64_t before = offsets.back();
+            for (std::size_t p = 1; p < band.offsets.size(); ++p) offsets.push_back(before + band.offsets[p]);
+            for (std::size_t c = 0; c < values.size(); ++c)
+                values[c].insert(values[c].end(), band.values[c].begin(), band.values[c].end());
+        }
+        EXPECT_EQ(offsets, whole.offsets);
+        EXPECT_EQ(values, whole.values);
+    }
+    RenderOptions tooMany = small();
+    tooMany.band = {0, 19};
+    EXPECT_THROW(render("band.exr", tooMany), Error);
+}
+
 TEST_F(Appending, BadMapsAndDumpsAreErrorsThatSayWhatWasFound) {
     const Window whole{0, 0, 21, 18};
     const auto message = [&](const Window& window) -> std::string {

@@ -9,6 +9,7 @@
 
 #include "../base/temporary_folder.h"
 #include "accelerator.h"
+#include "gltf_references.h"
 #include "gltf_text.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
@@ -355,6 +356,18 @@ TEST(LoadScene, EnvironmentFromExtrasOptionsAndImages) {
     EXPECT_THROW(load(g, options), Error);
     options.image = folder() / "missing.exr";
     EXPECT_THROW(load(g, options), Error);
+}
+
+TEST(GltfFiles, AreTheFileAndWhatItNames) {
+    const TemporaryFolder place;
+    const std::string path = place / "a.gltf";
+    std::ofstream(path) << R"({"buffers":[{"uri":"b%20c.bin"},{"uri":"data:;base64,AA=="},{}],
+        "images":[{"uri":"textures/wood.png"},{"bufferView":0}]})";
+    EXPECT_EQ(gltfFiles(path),
+              (std::vector<std::string>{path, place / "b c.bin", place / "textures/wood.png"}));
+    std::ofstream(path) << "{ no glTF";
+    EXPECT_EQ(gltfFiles(path), std::vector<std::string>{path});
+    EXPECT_EQ(gltfFiles(VLX_TESTDATA "/scenes/interior.glb").size(), 1u);
 }
 
 TEST(LoadScene, DropsAndCountsTrianglesWithoutArea) {

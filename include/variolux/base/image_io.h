@@ -1,7 +1,9 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "variolux/base/image.h"
 
@@ -20,10 +22,36 @@ struct ImageWriteOptions {
     std::map<std::string, std::string> attributes;  ///< EXR and PNG text attributes
 };
 
-/// Writes `image` in the format of the path's extension. 8-bit formats get values clamped to [0, 1] and
-/// quantised as they are: apply a transfer function first (see linearToSrgb). The file appears under its name
-/// only when complete. Throws Error when the format is unknown or the disk refuses.
+/// Writes an image row by row in the format of the path's extension. 8-bit formats get values clamped to [0,
+/// 1] and quantised as they are: apply a transfer function first (see linearToSrgb). The file appears under
+/// its name only after close(). All throw Error when the format is unknown or the disk refuses.
+class ImageWriter {
+  public:
+    ImageWriter(const std::string& path, const Window& data, const Window& display,
+                const std::vector<std::string>& channels, const ImageWriteOptions& options = {});
+    ~ImageWriter();
+    ImageWriter(const ImageWriter&) = delete;
+    ImageWriter& operator=(const ImageWriter&) = delete;
+
+    /// The next `count` rows from the top: interleaved channels, as Image::pixels has them.
+    void write(const float* rows, int count);
+    /// Gives the file its name. Throws Error when rows are missing, too.
+    void close();
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Writes a whole image as ImageWriter does.
 void writeImage(const std::string& path, const Image& image, const ImageWriteOptions& options = {});
+
+/// Text attribute of an image or a dump that says what it was made of: a hash of inputs and parameters,
+/// followed by " band I/N" where only a band of rows was made.
+inline constexpr char kInputsAttribute[] = "variolux:inputs";
+
+/// A text attribute of the first part of an image or a dump; empty when there is none, or no such file.
+std::string readTextAttribute(const std::string& path, const std::string& name);
 
 /// The sRGB transfer function: linear value in [0, 1] to display value in [0, 1]; clamps outside (NaN to 0).
 float linearToSrgb(float linear);

@@ -17,4 +17,19 @@ struct Window {
     bool operator==(const Window&) const = default;
 };
 
+/// One of `count` bands of nearly equal numbers of rows that a window is cut into, from the top.
+struct Band {
+    int index = 0;  ///< from 0
+    int count = 1;
+};
+
+/// The rows [h index / count, h (index + 1) / count) of a window of h rows, rounded down; none where there
+/// are more bands than rows.
+inline Window bandOf(const Window& window, const Band& band) {
+    const auto row = [&](int i) {
+        return static_cast<int>(static_cast<std::int64_t>(window.height) * i / band.count);
+    };
+    return {window.x, window.y + row(band.index), window.width, row(band.index + 1) - row(band.index)};
+}
+
 }  // namespace vlx

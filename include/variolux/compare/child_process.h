@@ -21,9 +21,14 @@ struct ProcessRun {
 };
 
 /// Runs `command` with /bin/sh -c in the present folder, without standard input, and waits for its end. Times
-/// and memory are the kernel's own account (wait4). The command gets SIGTERM if this process dies. Throws
-/// Error when no process can be started, and when the output exceeds 64 MiB.
+/// and memory are the kernel's own account (wait4). The command is a process group of its own; it gets
+/// SIGTERM if this process dies. Throws Error when no process can be started, and when the output exceeds 64
+/// MiB.
 ProcessRun runCommand(const std::string& command);
+
+/// Sends SIGTERM to the command that runCommand() waits for, if there is one, and all that it started. For a
+/// program's signal handler: async-signal-safe.
+void endRunningCommand() noexcept;
 
 /// The text as one word of a shell command: itself if it is harmless, else in single quotes.
 std::string shellQuoted(const std::string& text);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,12 +60,6 @@ enum class Fireflies {
     Clamp,   ///< samples above a given luminance are scaled down to it: a bias that stays
 };
 
-/// One of `count` bands of nearly equal numbers of rows that an image is cut into, from the top.
-struct Band {
-    int index = 0;  ///< from 0
-    int count = 1;
-};
-
 struct DriftKrigingOptions {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;
@@ -77,9 +73,20 @@ struct DriftKrigingOptions {
     int scale = 1;   ///< 1 to 4: pixels of the image along each axis for one of the dump
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
 
+    /// Bytes that the process may take, at most (resident memory, as the kernel counts it); 0: any number.
+    /// Fewer rows of the dump are then read at a time.
+    std::uint64_t maxMemory = 0;
+
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
 };
+
+/// Takes the next `count` finished rows of an image, from the top: interleaved channels, as Image::pixels has
+/// them.
+using RowSink = std::function<void(const float* rows, int count)>;
+
+/// The image that reconstructDriftKriging() makes, without its pixels: windows and channels.
+Image driftKrigingOutline(const DumpReader& dump, const DriftKrigingOptions& options);
 
 /// With a scale above 1 the samples are sorted into parts of their pixels by their positions, and parts
 /// without samples are predicted; the windows grow by the scale.
@@ -88,8 +95,13 @@ struct DriftKrigingOptions {
 /// of threads. Every channel gets the same weights: parts that add up to R, G, B still do. Channels of the
 /// image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without samples is
 /// predicted from its neighbours and counted. Throws as DumpReader; Error when options are invalid, name
-/// channels that the dump lacks, ask for a scale where it has no positions or for more bands than rows.
+/// channels that the dump lacks, ask for a scale where it has no positions or for more bands than rows, and
+/// when maxMemory is too little, saying what would do.
 Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
                                        const Progress& progress = {});
+
+/// The same row by row: the image is never held whole.
+ReconstructionReport reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
+                                             const RowSink& sink, const Progress& progress = {});
 
 }  // namespace vlx
