@@ -44,7 +44,14 @@ class Accelerator {
     Accelerator(const Accelerator&) = delete;
     Accelerator& operator=(const Accelerator&) = delete;
 
-    std::optional<Hit> intersect(const Ray& ray, std::uint32_t seed) const;
+    std::optional<Hit> intersect(const Ray& ray, std::uint32_t seed) const {
+        return intersect(ray, seed, false);
+    }
+    /// As intersect, but single-sided surfaces are met from behind too: a ray against the direction in which
+    /// cameras look, which decides what is seen through.
+    std::optional<Hit> intersectBothSides(const Ray& ray, std::uint32_t seed) const {
+        return intersect(ray, seed, true);
+    }
     /// Whether something lies on the ray before `distance`.
     bool occluded(const Ray& ray, float distance, std::uint32_t seed) const;
 
@@ -54,6 +61,8 @@ class Accelerator {
     void* embreeScene() const;
 
   private:
+    std::optional<Hit> intersect(const Ray& ray, std::uint32_t seed, bool bothSides) const;
+
     struct Impl;
     std::unique_ptr<Impl> impl_;
     std::vector<RecordedRay>* recorder_ = nullptr;
