@@ -115,6 +115,7 @@ SubsetReport subsetDump(const std::string& input, const std::string& output, con
     const auto replicates = chooseReplicates(reader, options);
 
     DumpHeader header = reader.header();
+    header.splatReplicates = 0;  // the samples hold them
     const Window window = header.data;
     header.compression = options.compression;
     const std::optional<double> renderSeconds = header.renderSeconds;

@@ -14,6 +14,8 @@
 namespace vlx::render {
 namespace {
 
+thread_local std::uint64_t raysTested = 0;
+
 /// What Embree's filters get to see of a ray.
 struct RayContext : RTCIntersectContext {
     explicit RayContext(std::uint32_t raySeed, bool both = false) : seed(raySeed), bothSides(both) {
@@ -197,6 +199,7 @@ Accelerator::~Accelerator() = default;
 
 std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed, bool bothSides) const {
     if (recorder_ != nullptr) recorder_->push_back({ray, 0, seed, false});
+    ++raysTested;
     RayContext context(seed, bothSides);
     RTCRayHit r;
     r.ray = toEmbree(ray, std::numeric_limits<float>::infinity());
@@ -217,11 +220,14 @@ std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed, bo
 
 bool Accelerator::occluded(const Ray& ray, float distance, std::uint32_t seed) const {
     if (recorder_ != nullptr) recorder_->push_back({ray, distance, seed, true});
+    ++raysTested;
     RayContext context(seed);
     RTCRay r = toEmbree(ray, distance);
     rtcOccluded1(impl_->top, &context, &r);
     return r.tfar < 0;
 }
+
+std::uint64_t Accelerator::raysOnThisThread() { return raysTested; }
 
 void* Accelerator::embreeScene() const { return impl_->top; }
 

@@ -55,6 +55,9 @@ class Accelerator {
     /// Whether something lies on the ray before `distance`.
     bool occluded(const Ray& ray, float distance, std::uint32_t seed) const;
 
+    /// How many rays the calling thread has tested so far, in all scenes.
+    static std::uint64_t raysOnThisThread();
+
     /// For benchmarks: every ray from now on is appended to `rays` (null: no longer). One thread only.
     void record(std::vector<RecordedRay>* rays) { recorder_ = rays; }
     /// For benchmarks: the RTCScene.

@@ -193,6 +193,7 @@ std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const
                                     dimension::kDirection);
         const BsdfSample next = vertex.side.bsdf.sample(u, choice.x);
         if (next.delta ? isBlack(next.weight) : !(next.pdf > 0)) break;
+        if (delta && events == 1 && next.delta) break;  // what no path of PathTracer's finds
         const Vec3 direction = normalized(vertex.side.frame.toWorld(next.wi));
         const Side seen = vertex.from(scene_, direction);
         if (!seen.lets(vertex.back)) break;

@@ -36,6 +36,7 @@ enum class Strategies {
 ///   factors of shading normals and refraction that light has and importance has not (Veach, 1997, 5.3);
 /// - surfaces are seen through from behind as camera rays do: light that comes to the front of a single-sided
 ///   one may also go on behind it.
+/// Caustics of lights without an extent are left out, as PathTracer cannot find them.
 /// Solids inside one another may take absorption from the wrong one on the light's way. General kernel only;
 /// effects that are left out must be the scene's or lobes of surfaces, not caustics. Refers to scene,
 /// accelerator and view, which must outlive it; safe to use from many threads.

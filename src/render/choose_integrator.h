@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "render.h"
+
+namespace vlx::render {
+
+enum class IntegratorRequest { Auto, Path, Bidirectional };
+
+constexpr std::string_view nameOf(Integrator integrator) {
+    return integrator == Integrator::Path ? "path" : "bidirectional";
+}
+
+struct IntegratorChoice {
+    Integrator chosen = Integrator::Path;
+    std::string reason;
+    bool tried = false;  ///< a pilot decided
+};
+
+/// Which integrator lowers the error faster. Path tracing, unless the plan (`options.plan`) has caustics, or
+/// less than a quarter of the light comes to what the camera sees straight from the lights, and the picture
+/// has so many `samples` that a pilot pays. Then both trace the picture small, 16 times, and what counts is
+/// the mean squared error of one sample a pixel, relative as relMSE is, against the mean of all pilots of
+/// both (which knows light that path tracing's own variance has missed), times the number of rays.
+/// Deterministic: no clock is read. One thread.
+IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& accelerator,
+                                  const RenderOptions& options, double samples);
+
+}  // namespace vlx::render
