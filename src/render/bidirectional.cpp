@@ -53,6 +53,9 @@ struct BidirectionalTracer::Vertex {
     Rgb throughput;  ///< of light subpaths: divided by the cosine with `back`
     double vcm = 0;
     double vc = 0;
+    // The same over the strategies s = 0 and s = 1 only, PathTracer's; of light subpaths.
+    double pathVcm = 0;
+    double pathVc = 0;
     int events = 1;                    ///< scattering events of its subpath, with this one
     const Material* medium = nullptr;  ///< that absorbs on the side of `back`,
     const Material* beyond = nullptr;  ///< and on the other
@@ -73,6 +76,7 @@ struct BidirectionalTracer::Vertex {
         const double cosHere = mis(std::max(cosine(back), 1e-9f));
         vcm *= mis(distanceSquared) / cosHere;
         vc /= cosHere;
+        pathVc /= cosHere;
     }
 };
 
@@ -132,7 +136,7 @@ std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const
     std::uint32_t rays = 0;
     Ray ray = start.ray;
     Rgb throughput = start.throughput;
-    double vcm = 0, vc = 0, way = 0;
+    double vcm = 0, vc = 0, pathVc = 0, way = 0;
     const Material* medium = nullptr;
     path.reserve(6);
 
@@ -176,9 +180,12 @@ std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const
             }
             vertex.vcm = mis(direct / (start.density * cosBack));
             vertex.vc = delta ? 0 : mis(1 / (start.density * cosBack));
+            vertex.pathVcm = vertex.vcm;
+            vertex.pathVc = vertex.vc;
         } else {
             vertex.vcm = vcm;
             vertex.vc = vc;
+            vertex.pathVc = pathVc;
             vertex.arriveAt(way * way);
         }
         vertex.throughput = throughput / cosBack;
@@ -208,11 +215,13 @@ std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const
             }
             vcm = 0;
             vc = vertex.vc * mis(vertex.cosine(direction));
+            pathVc = vertex.pathVc * mis(vertex.cosine(direction));
         } else {
             const BsdfValue f = seen.evaluate(vertex.back);
             scattered = f.value / next.pdf;
-            vc = mis(vertex.cosine(direction) / static_cast<double>(next.pdf)) *
-                 (vertex.vc * mis(f.pdf) + vertex.vcm);
+            const double turned = mis(vertex.cosine(direction) / static_cast<double>(next.pdf));
+            vc = turned * (vertex.vc * mis(f.pdf) + vertex.vcm);
+            pathVc = turned * (vertex.pathVc * mis(f.pdf) + vertex.pathVcm);
             vcm = mis(1 / static_cast<double>(next.pdf));
         }
         scattered *= vertex.cosine(direction) / cosBack;
@@ -231,8 +240,9 @@ std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const
     return path;
 }
 
-Rgb BidirectionalTracer::directLight(const Vertex& eye, const LightSampler::Local& local, float choice,
-                                     Vec2 u, float time, std::uint32_t seed) const {
+BidirectionalTracer::Found BidirectionalTracer::directLight(const Vertex& eye,
+                                                            const LightSampler::Local& local, float choice,
+                                                            Vec2 u, float time, std::uint32_t seed) const {
     const LightSample light = lights_.sample(local, choice, u);
     if (!(light.pdf > 0) || isBlack(light.radiance) || !eye.side.lets(light.direction)) return {};
     const BsdfValue f = eye.side.evaluate(light.direction);
@@ -246,12 +256,13 @@ Rgb BidirectionalTracer::directLight(const Vertex& eye, const LightSampler::Loca
     const double byChance = light.delta ? 0 : mis(f.pdf / static_cast<double>(light.pdf));
     const double byLight =
         mis(emitted * eye.cosine(light.direction) / direct) * (eye.vcm + eye.vc * mis(reverse));
-    return f.value * light.radiance * eye.arriving(light.direction, light.distance) *
-           (weight(Strategies::DirectLight, byChance + byLight) / light.pdf);
+    const float w = weight(Strategies::DirectLight, byChance + byLight);
+    return {f.value * light.radiance * eye.arriving(light.direction, light.distance) * (w / light.pdf),
+            spreadOf(w, 1 + byChance)};
 }
 
-Rgb BidirectionalTracer::connection(const Vertex& eye, const Vertex& light, float time,
-                                    std::uint32_t seed) const {
+BidirectionalTracer::Found BidirectionalTracer::connection(const Vertex& eye, const Vertex& light, float time,
+                                                           std::uint32_t seed) const {
     const Vec3 to = light.position() - eye.position();
     const float d2 = lengthSquared(to);
     if (!(d2 > 0)) return {};
@@ -274,8 +285,9 @@ Rgb BidirectionalTracer::connection(const Vertex& eye, const Vertex& light, floa
     const float w = eye.events == 1 || strategies_ == Strategies::All
                         ? weight(Strategies::Connection, byEye + byLight)
                         : 0;
-    return f.value * g.value * light.throughput * eye.arriving(direction, distance) *
-           (w * static_cast<float>(atLight));
+    return {f.value * g.value * light.throughput * eye.arriving(direction, distance) *
+                (w * static_cast<float>(atLight)),
+            spreadOf(w, mis(f.pdf * atLight) * (light.pathVcm + light.pathVc * mis(g.pdf)))};
 }
 
 void BidirectionalTracer::splat(const Vertex& light, Vec2 lens, float time, std::uint32_t seed,
@@ -296,16 +308,18 @@ void BidirectionalTracer::splat(const Vertex& light, Vec2 lens, float time, std:
     const double area = seen.density * light.cosine(direction) / static_cast<double>(d2);
     const double byEye =
         mis(area / static_cast<double>(window_.pixels())) * (light.vcm + light.vc * mis(f.pdf));
-    Rgb radiance =
-        light.throughput * f.value * (weight(Strategies::Splatting, byEye) * static_cast<float>(area));
+    const float w = weight(Strategies::Splatting, byEye);
+    const double byPath =
+        mis(area / static_cast<double>(window_.pixels())) * (light.pathVcm + light.pathVc * mis(f.pdf));
+    Rgb radiance = light.throughput * f.value * (w * static_cast<float>(area));
     const Material& material = *side.point.material;
     if (side.point.fromBehind && absorbs_ && material.absorbs())
         radiance *= transmitted(material.absorption, distance);
-    if (!isBlack(radiance)) splats.push_back({seen.x, seen.y, radiance});
+    if (!isBlack(radiance)) splats.push_back({seen.x, seen.y, radiance, spreadOf(w, byPath)});
 }
 
 PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                                      std::vector<Splat>& splats) const {
+                                      std::vector<Splat>& splats, Rgb* pathSquares) const {
     const std::vector<Vertex> light = lightSubpath(sampler, time);
     const std::uint32_t seed = hashesOpacity_ ? sampler.hashSeed(dimension::kOpacity) : 0;
     std::uint32_t rays = 0x40000000u;  // of connections; each has its own opacity
@@ -325,17 +339,25 @@ PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, c
     bool featuresPending = true;
     const Material* medium = nullptr;
 
+    const auto add = [&](const Found& found) {
+        const Rgb v = throughput * found.radiance;
+        result.radiance += v;
+        if (pathSquares != nullptr) *pathSquares += v * v * found.spread;
+    };
+
     for (int bounce = 0;; ++bounce) {
         // Of light that is met by chance, its density for next-event estimation and for light subpaths known.
-        const auto chanceWeight = [&](double direct, double emitted) {
-            if (bounce == 0) return 1.f;
-            return weight(Strategies::Chance, mis(direct) * vcm + mis(emitted) * vc);
+        const auto byChance = [&](const Rgb& radiance, double direct, double emitted) -> Found {
+            if (bounce == 0) return {radiance, 1};
+            const double byDirect = mis(direct) * vcm;
+            const float w = weight(Strategies::Chance, byDirect + mis(emitted) * vc);
+            return {radiance * w, spreadOf(w, 1 + byDirect)};
         };
-        const auto densities = [&](std::size_t index, std::uint32_t triangle, float distance,
-                                   float cosLight) {
+        const auto foundOf = [&](const Rgb& radiance, std::size_t index, std::uint32_t triangle,
+                                 float distance, float cosLight) {
             const double direct =
                 lightsSampled ? directDensity(local, index, triangle, ray.direction, distance, cosLight) : 0;
-            return chanceWeight(direct, emitter_.density(index, triangle, ray.direction * -1.f));
+            return byChance(radiance, direct, emitter_.density(index, triangle, ray.direction * -1.f));
         };
         const std::uint32_t raySeed = seed + 2 * static_cast<std::uint32_t>(bounce);
         const std::optional<Hit> hit = accelerator_.intersect(ray, raySeed);
@@ -343,8 +365,8 @@ PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, c
             if (scene_.environment) {
                 countEffect(Effect::Environment);
                 const std::optional<std::size_t> index = lights_.environment();
-                const float w = index ? densities(*index, 0, 0, 1) : 1;
-                result.radiance += throughput * scene_.environment.radiance(ray.direction) * w;
+                const Rgb radiance = scene_.environment.radiance(ray.direction);
+                add(index ? foundOf(radiance, *index, 0, 0, 1) : Found{radiance, 1});
             }
             break;
         }
@@ -358,10 +380,10 @@ PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, c
             const Light& sphere = scene_.lights[index];
             const Vec3 outwards = ray.origin + ray.direction * hit->distance - sphere.position;
             // From within, no other strategy finds it.
-            const float w =
-                dot(outwards, ray.direction) < 0 ? densities(index, 0, hit->distance, 1) : chanceWeight(0, 0);
             if (medium != nullptr) throughput *= transmitted(medium->absorption, hit->distance);
-            result.radiance += throughput * sphere.sphereRadiance(-ray.direction) * w;
+            const Rgb radiance = sphere.sphereRadiance(-ray.direction);
+            add(dot(outwards, ray.direction) < 0 ? foundOf(radiance, index, 0, hit->distance, 1)
+                                                 : byChance(radiance, 0, 0));
             if (featuresPending) result.normal = normalized(outwards);
             break;
         }
@@ -375,10 +397,9 @@ PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, c
             const float cosLight = std::abs(dot(point.geometricNormal, ray.direction));
             const Rgb emitted =
                 emittedRadiance(scene_, *point.shape, point.triangle, hit->u, hit->v, cosLight);
-            const float w = point.shape->light >= 0 ? densities(static_cast<std::size_t>(point.shape->light),
-                                                                hit->triangle, hit->distance, cosLight)
-                                                    : chanceWeight(0, 0);
-            result.radiance += throughput * emitted * w;
+            add(point.shape->light >= 0 ? foundOf(emitted, static_cast<std::size_t>(point.shape->light),
+                                                  hit->triangle, hit->distance, cosLight)
+                                        : byChance(emitted, 0, 0));
         }
         if (!featuresPending && bounce >= options_.maxBounces) break;
 
@@ -404,12 +425,11 @@ PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, c
         lightsSampled = bsdf.hasSmoothLobe() && !lights_.empty();
         if (lightsSampled) {
             lights_.prepare(local, receiverAt(point));
-            result.radiance += throughput * directLight(eye, local, pairs[dimension::kLightChoice].x,
-                                                        pairs[dimension::kLight], time, raySeed + 1);
+            add(directLight(eye, local, pairs[dimension::kLightChoice].x, pairs[dimension::kLight], time,
+                            raySeed + 1));
             for (const Vertex& v : light) {
                 if (eye.events + v.events > options_.maxBounces) break;
-                if (v.side.bsdf.hasSmoothLobe())
-                    result.radiance += throughput * connection(eye, v, time, seed + rays++);
+                if (v.side.bsdf.hasSmoothLobe()) add(connection(eye, v, time, seed + rays++));
             }
         }
 

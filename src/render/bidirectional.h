@@ -13,7 +13,8 @@ namespace vlx::render {
 struct Splat {
     float x = 0;  ///< raster position, inside the window
     float y = 0;
-    Rgb radiance;  ///< to be divided by the number of light subpaths for each pixel of the window
+    Rgb radiance;      ///< to be divided by the number of light subpaths for each pixel of the window
+    float spread = 0;  ///< radiance^2 x spread: part of the second moment of path tracing (pathSquares)
 };
 
 /// Which strategies of a bidirectional tracer count, by their number of light vertices s and eye vertices t
@@ -48,17 +49,24 @@ class BidirectionalTracer {
                         Strategies strategies = Strategies::All);
 
     /// Of a camera sample through raster (x, y) at a point of the lens; t >= 2 in the result, t = 1 appended
-    /// to `splats`.
+    /// to `splats`. To `pathSquares` is added, if it is given, what together with radiance^2 x spread of the
+    /// splats estimates the second moment of a sample of PathTracer's, without products of different paths:
+    /// f^2 / p over all paths f found, p being the density with which PathTracer would have.
     PathSample trace(float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                     std::vector<Splat>& splats) const;
+                     std::vector<Splat>& splats, Rgb* pathSquares = nullptr) const;
 
   private:
     struct Vertex;
+    /// Weighed radiance of a path, and as Splat::spread.
+    struct Found {
+        Rgb radiance;
+        float spread = 0;
+    };
 
     std::vector<Vertex> lightSubpath(const PathSampler& sampler, float time) const;
-    Rgb directLight(const Vertex& eye, const LightSampler::Local& local, float choice, Vec2 u, float time,
-                    std::uint32_t seed) const;
-    Rgb connection(const Vertex& eye, const Vertex& light, float time, std::uint32_t seed) const;
+    Found directLight(const Vertex& eye, const LightSampler::Local& local, float choice, Vec2 u, float time,
+                      std::uint32_t seed) const;
+    Found connection(const Vertex& eye, const Vertex& light, float time, std::uint32_t seed) const;
     void splat(const Vertex& light, Vec2 lens, float time, std::uint32_t seed,
                std::vector<Splat>& splats) const;
     /// Density (per solid angle; of finite delta lights per area) with which next-event estimation at a
@@ -66,6 +74,11 @@ class BidirectionalTracer {
     double directDensity(const LightSampler::Local& local, std::size_t light, std::uint32_t triangle,
                          const Vec3& direction, float distance, float cosLight) const;
     float weight(Strategies own, double others) const;
+    /// Density of a strategy over its weight and PathTracer's density, whose squares (over its own) add up to
+    /// `byPath`.
+    static float spreadOf(float weight, double byPath) {
+        return weight > 0 && byPath > 0 ? static_cast<float>(1 / (weight * std::sqrt(byPath))) : 0;
+    }
 
     const Scene& scene_;
     const Accelerator& accelerator_;

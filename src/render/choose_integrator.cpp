@@ -40,6 +40,7 @@ struct SmallPicture {
 /// Pilots of one integrator: a picture a round, pixel by pixel, channel by channel.
 struct Pilot {
     std::array<std::vector<double>, kRounds> rounds;
+    std::vector<double> pathSquares;  ///< bidirectional: second moment of path tracing, a round's mean
     double rays = 0;
 
     double sum() const {
@@ -64,16 +65,15 @@ class Pilots {
         path.maxBounces = std::min(path.maxBounces, maxBounces);
         const PathTracer tracer(scene_, accelerator_, path);
         return run(rounds, [&](float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                               std::vector<Splat>&) {
-            return tracer.trace(view_.ray(x, y, lens, time), sampler).radiance;
-        });
+                               std::vector<Splat>&,
+                               Rgb&) { return tracer.trace(view_.ray(x, y, lens, time), sampler).radiance; });
     }
 
     Pilot bidirectional() const {
         const BidirectionalTracer tracer(scene_, accelerator_, view_, picture_.window, options_.path);
         return run(kRounds, [&](float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                                std::vector<Splat>& splats) {
-            return tracer.trace(x, y, lens, time, sampler, splats).radiance;
+                                std::vector<Splat>& splats, Rgb& squares) {
+            return tracer.trace(x, y, lens, time, sampler, splats, &squares).radiance;
         });
     }
 
@@ -85,18 +85,19 @@ class Pilots {
         const bool lens = options_.path.effects.has(Effect::DepthOfField);
         const bool moves = options_.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion});
         Pilot pilot;
+        pilot.pathSquares.assign(3 * pixels, 0.0);
         std::vector<Splat> splats;
         const std::uint64_t before = accelerator_.raysOnThisThread();
         for (int round = 0; round < rounds; ++round) {
             std::vector<double>& sums = pilot.rounds[static_cast<std::size_t>(round)];
             sums.assign(3 * pixels, 0.0);
-            const auto add = [&](int column, int row, const Rgb& v, double scale) {
+            const auto add = [&](std::vector<double>& to, int column, int row, const Rgb& v, double scale) {
                 if (!isFinite(v)) return;
                 const auto at =
                     3 * static_cast<std::size_t>((row - window.y) * window.width + column - window.x);
-                sums[at] += v.x * scale;
-                sums[at + 1] += v.y * scale;
-                sums[at + 2] += v.z * scale;
+                to[at] += v.x * scale;
+                to[at + 1] += v.y * scale;
+                to[at + 2] += v.z * scale;
             };
             for (int row = window.y; row < window.y + window.height; ++row)
                 for (int column = window.x; column < window.x + window.width; ++column) {
@@ -104,13 +105,18 @@ class Pilots {
                     const Vec2 at = sampler.pair(dimension::kPixel);
                     const Vec2 u = lens ? sampler.pair(dimension::kLens) : Vec2{};
                     const float time = moves ? sampler.pair(dimension::kTime).x : 0;
-                    add(column, row,
+                    Rgb squares;
+                    add(sums, column, row,
                         trace(static_cast<float>(column) + at.x, static_cast<float>(row) + at.y, u, time,
-                              sampler, splats),
+                              sampler, splats, squares),
                         1);
-                    for (const Splat& s : splats)
-                        add(static_cast<int>(s.x), static_cast<int>(s.y), s.radiance,
-                            1 / static_cast<double>(pixels));
+                    add(pilot.pathSquares, column, row, squares, 1.0 / kRounds);
+                    for (const Splat& s : splats) {
+                        const Rgb v = s.radiance / static_cast<float>(pixels);
+                        add(sums, static_cast<int>(s.x), static_cast<int>(s.y), v, 1);
+                        add(pilot.pathSquares, static_cast<int>(s.x), static_cast<int>(s.y), v * v * s.spread,
+                            1.0 / kRounds);
+                    }
                     splats.clear();
                 }
         }
@@ -125,16 +131,39 @@ class Pilots {
     View view_;
 };
 
-/// Mean relative squared error of one round against `reference`.
-double relativeError(const Pilot& pilot, const std::vector<double>& reference) {
-    double sum = 0;
-    for (const auto& round : pilot.rounds)
-        for (std::size_t i = 0; i < reference.size(); ++i) {
-            const double d = round[i] - reference[i];
-            sum += d * d / (reference[i] * reference[i] + 0.01);
+/// Mean and variance of a round, of each pixel and channel.
+struct Statistics {
+    explicit Statistics(const Pilot& pilot) : mean(pilot.rounds[0].size()), variance(mean.size()) {
+        for (std::size_t i = 0; i < mean.size(); ++i) {
+            double squares = 0;
+            for (const auto& round : pilot.rounds) {
+                mean[i] += round[i] / kRounds;
+                squares += round[i] * round[i] / kRounds;
+            }
+            variance[i] = std::max(0.0, squares - mean[i] * mean[i]) * kRounds / (kRounds - 1);
         }
-    return sum / (kRounds * static_cast<double>(reference.size()));
-}
+    }
+    std::vector<double> mean, variance;
+};
+
+/// Mean relative variances of one round of both integrators, as relMSE weighs errors.
+struct Errors {
+    Errors(const Statistics& a, const Statistics& b, const std::vector<double>& pathSquares) {
+        double known = 0;
+        const std::size_t n = a.mean.size();
+        for (std::size_t i = 0; i < n; ++i) {
+            const double mean = 0.5 * (a.mean[i] + b.mean[i]);
+            const double scale = 1 / ((mean * mean + 0.01) * static_cast<double>(n));
+            path += a.variance[i] * scale;
+            both += b.variance[i] * scale;
+            known += (pathSquares[i] - b.mean[i] * b.mean[i]) * scale;
+        }
+        // What path tracing has not met in the pilot does not show in its own variance.
+        path = std::max(path, known);
+    }
+    double path = 0;
+    double both = 0;
+};
 
 std::string text(const char* format, double value) {
     char buffer[64];
@@ -171,12 +200,9 @@ IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& acceler
     }
     const Pilot path = pilots.path(options.path.maxBounces, kRounds);
     const Pilot both = pilots.bidirectional();
-    std::vector<double> reference(both.rounds[0].size());
-    for (const Pilot* pilot : {&path, &both})
-        for (const auto& round : pilot->rounds)
-            for (std::size_t i = 0; i < reference.size(); ++i) reference[i] += round[i] / (2 * kRounds);
-    const double pathCost = relativeError(path, reference) * path.rays;
-    const double bothCost = relativeError(both, reference) * both.rays * kRayCost;
+    const Errors errors{Statistics(path), Statistics(both), both.pathSquares};
+    const double pathCost = errors.path * path.rays;
+    const double bothCost = errors.both * both.rays * kRayCost;
     const bool better = bothCost * kMargin < pathCost;
     const double ratio = bothCost > 0 ? pathCost / bothCost : 1;
     return {
