@@ -15,7 +15,7 @@ constexpr int kRounds = 16;
 /// Samples of the picture from which on a pilot, about 0.4 s, is worth it.
 constexpr double kLeastSamples = 2e5;
 /// Time of a bidirectional tracer's ray, scattering included, over that of a path tracer's.
-constexpr double kRayCost = 1.0;
+constexpr double kRayCost = 1.25;
 /// How many times as fast bidirectional tracing must be: pilots err.
 constexpr double kMargin = 1.25;
 
