@@ -9,6 +9,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "choose_integrator.h"
 #include "finished.h"
 #include "frames.h"
 #include "gltf_references.h"
@@ -39,6 +40,7 @@ struct TraceCommand {
     bool listCameras = false;
     bool json = false;
     std::string effects = "auto";
+    IntegratorRequest integrator = IntegratorRequest::Auto;
     std::string explain;
     std::vector<double> shutter;
     double timeLimit = 0;
@@ -142,9 +144,16 @@ struct TraceCommand {
                        "--explain prints their names")
             ->type_name("auto|all|auto,-NAME")
             ->capture_default_str();
+        using enum IntegratorRequest;
+        vlx::addChoice(app, "--integrator", integrator,
+                       {{"auto", Auto}, {"path", Path}, {"bidirectional", Bidirectional}},
+                       "How light is followed. path: from the camera; bidirectional: from the lights too, "
+                       "for caustics of small lights and hidden lights, at several times the cost of a "
+                       "sample; auto: where the scene may call for it, a short pilot decides");
         app.add_flag("--explain{text}", explain,
-                     "Print which effects the scene calls for, why, and what part of the time each takes\n"
-                     "(from a short pilot), and end; --explain=json: the same as JSON")
+                     "Print which effects the scene calls for, why, what part of the time each takes\n"
+                     "(from a short pilot), and which integrator is chosen, and end; --explain=json: the "
+                     "same as JSON")
             ->check(CLI::IsMember({"text", "json"}));
         app.add_option("--shutter", shutter,
                        "When the shutter opens and closes, in seconds of the scene's animations\n"
@@ -240,6 +249,8 @@ struct TraceCommand {
         std::optional<EarlierDump> earlier;
         if (!earlierPath.empty()) takeSizeOf(earlier.emplace(earlierPath));
         setSize(loaded.cameras[options.camera]);
+        if (integrator == IntegratorRequest::Bidirectional && targetError > 0)
+            throw CLI::ValidationError("--target-error", "judges by path tracing: not with bidirectional");
         if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
         options.version = VARIOLUX_VERSION;
         if (const auto fault = options.validate(loaded)) throw CLI::ValidationError(*fault);
@@ -257,9 +268,15 @@ struct TraceCommand {
         for (const std::string& warning : plan.warnings) note("warning: " + warning);
         applyPlan(loaded, plan);
         options.follow(plan);
-        if (!explain.empty()) return printPlan(loaded, plan);
-
         const Accelerator accelerator(loaded, options.path.effects);
+        const IntegratorChoice choice = chooseIntegrator(loaded, accelerator);
+        if (!explain.empty()) return printPlan(loaded, plan, choice);
+        options.integrator = choice.chosen;
+        options.integratorReason = std::string(nameOf(choice.chosen)) + ": " + choice.reason;
+        if (const auto fault = options.validate(loaded)) throw CLI::ValidationError(*fault);
+        if (choice.tried || choice.chosen == Integrator::Bidirectional)
+            note("integrator " + options.integratorReason);
+
         if (timeLimit > 0 || targetError > 0) chooseSamples(loaded, accelerator);
         hash->checkUnchanged();  // all is read but the dump that is added to, which stays open
         const RenderReport report = renderDump(loaded, accelerator, dump, options, progress);
@@ -298,7 +315,20 @@ struct TraceCommand {
         return vlx::kDone;
     }
 
-    int printPlan(const Scene& loaded, const Plan& plan) const {
+    IntegratorChoice chooseIntegrator(const Scene& loaded, const Accelerator& accelerator) const {
+        if (integrator != IntegratorRequest::Auto)
+            return {integrator == IntegratorRequest::Path ? Integrator::Path : Integrator::Bidirectional,
+                    "asked for", false};
+        if (targetError > 0) return {Integrator::Path, "--target-error judges by path tracing", false};
+        // With --time as many samples as take a second are worth a pilot.
+        const double samples = timeLimit > 0 ? timeLimit * 2e5 : options.spp;
+        const vlx::Window whole{0, 0, options.width, options.height};
+        const auto pixels = static_cast<double>(options.crop.value_or(whole).pixels());
+        return vlx::render::chooseIntegrator(loaded, accelerator, options,
+                                             timeLimit > 0 ? samples : samples * pixels);
+    }
+
+    int printPlan(const Scene& loaded, const Plan& plan, const IntegratorChoice& choice) const {
         const auto shares = pilotShares(loaded, plan, options);
         if (explain == "json") {
             nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -312,9 +342,12 @@ struct TraceCommand {
             const nlohmann::ordered_json features{{"albedo", plan.features.albedo},
                                                   {"normal", plan.features.normalAndDepth},
                                                   {"depth", plan.features.normalAndDepth}};
+            const nlohmann::ordered_json integrator{{"chosen", nameOf(choice.chosen)},
+                                                    {"reason", choice.reason}};
             std::cout << nlohmann::ordered_json{{"effects", list},
                                                 {"lights", loaded.lights.size()},
-                                                {"recorded", features}}
+                                                {"recorded", features},
+                                                {"integrator", integrator}}
                              .dump(2)
                       << "\n";
             return vlx::kDone;
@@ -330,6 +363,7 @@ struct TraceCommand {
             std::printf("not recorded: %s, %s\n",
                         plan.features.normalAndDepth ? "albedo" : "albedo, normal and depth",
                         plan.features.reason.c_str());
+        std::printf("integrator %s: %s\n", std::string(nameOf(choice.chosen)).c_str(), choice.reason.c_str());
         return vlx::kDone;
     }
 
@@ -373,6 +407,8 @@ struct TraceCommand {
         const double rounded =
             replicates * (timeLimit > 0 ? std::floor(wanted / replicates) : std::ceil(wanted / replicates));
         options.spp = static_cast<int>(std::clamp(rounded, replicates, most));
+        if (options.integrator == Integrator::Bidirectional)
+            while (options.splatReplicates() == 0 && options.spp > 1) --options.spp;
         note(std::to_string(options.spp) + " samples a pixel");
     }
 
@@ -399,6 +435,7 @@ struct TraceCommand {
                                      {"triangles", loaded.triangleCount()},
                                      {"lights", loaded.lights.size()},
                                      {"effects", options.plan->simulated()},
+                                     {"integrator", nameOf(options.integrator)},
                                      {"samples", report.samples},
                                      {"nonFinite", report.nonFinite},
                                      {"degenerateTriangles", loaded.report.degenerateTriangles},

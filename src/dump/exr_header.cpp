@@ -25,6 +25,7 @@
 #include "little_endian.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
+#include "variolux/dump/splats.h"
 
 namespace vlx {
 
@@ -37,6 +38,8 @@ constexpr char kSeed[] = "variolux:seed";
 constexpr char kSamples[] = "variolux:samples";
 constexpr char kPixelFilter[] = "variolux:pixelFilter";
 constexpr char kEffects[] = "variolux:effects";
+constexpr char kSplatReplicates[] = "variolux:splatReplicates";
+constexpr char kReplicatesShare[] = "variolux:replicatesShare";
 constexpr char kRenderSeconds[] = "variolux:renderSeconds";
 constexpr char kMaxSamples[] = "maxSamplesPerPixel";
 constexpr char kWorldToCamera[] = "worldToCamera";
@@ -252,6 +255,7 @@ DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
         const auto [end, status] = std::from_chars(text->data(), text->data() + text->size(), seed);
         if (status == std::errc() && end == text->data() + text->size()) dump.seed = seed;
     }
+    dump.replicatesShare = value<int>(header, kReplicatesShare).value_or(0) != 0;
     dump.samples = number(header, kSamples);
     dump.renderSeconds = number(header, kRenderSeconds);
     if (dump.renderSeconds && !(*dump.renderSeconds > 0)) dump.renderSeconds.reset();  // 0: not recorded
@@ -262,6 +266,29 @@ DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
         if (text != nullptr && !isReserved(it.name())) dump.extra[it.name()] = text->value();
     }
     return dump;
+}
+
+// What the part `splats` must be for its samples.
+void checkSplats(const std::string& path, const Imf::Header& splats, const DumpHeader& dump) {
+    const auto fail = [&](const std::string& what) { throw Error(path, "damaged part splats: " + what); };
+    const int replicates = dump.splatReplicates;
+    if (replicates < 1 || replicates > kMostSplatReplicates)
+        fail("expected 1 to " + std::to_string(kMostSplatReplicates) + " replicates, found " +
+             std::to_string(replicates));
+    if (toWindow(path, "data window", splats.dataWindow()) != dump.data)
+        fail("expected the data window of the samples, found another one");
+    if (toCompression(path, splats.compression()) != dump.compression)
+        fail("expected the compression of the samples, found another one");
+    std::vector<std::string> found;
+    for (const DumpChannel& channel : toChannels(path, splats.channels())) {
+        if (channel.type != ChannelType::Float) fail("expected float channels, found " + channel.name);
+        found.push_back(channel.name);
+    }
+    if (found != splatChannels(replicates))
+        fail("expected channels r00.B, r00.G, r00.R and so on for " + std::to_string(replicates) +
+             " replicates, found others");
+    if (replicates > 1 && findChannel(dump, "sample.replicate") < 0)
+        fail("the samples lack the channel sample.replicate");
 }
 
 // Every row takes a table entry, a chunk head, and its packed sample counts: a small file cannot hold a huge
@@ -277,6 +304,15 @@ void checkClaims(const std::string& path, const FileHeader& header, std::uint64_
 }
 
 }  // namespace
+
+std::vector<std::string> splatChannels(int replicates) {
+    std::vector<std::string> names;
+    for (int r = 0; r < replicates; ++r)
+        for (const char channel : {'B', 'G', 'R'})
+            names.push_back(
+                {'r', static_cast<char>('0' + r / 10), static_cast<char>('0' + r % 10), '.', channel});
+    return names;
+}
 
 std::string windowText(const Window& window) {
     return std::to_string(window.width) + " x " + std::to_string(window.height) + " pixels at (" +
@@ -325,19 +361,40 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
     if (findAttribute(parts[part], "displayWindow") == nullptr) header.dump.display = header.dump.data;
     header.part = static_cast<int>(part);
 
+    std::size_t splats = 0;
+    for (; splats < parts.size(); ++splats)
+        if (rawText(start, findAttribute(parts[splats], "name")) == "splats" &&
+            findAttribute(parts[splats], kSplatReplicates) != nullptr)
+            break;
+    if (splats < parts.size()) {
+        for (const char* required : {"channels", "compression", "dataWindow"})
+            if (findAttribute(parts[splats], required) == nullptr)
+                throw Error(path,
+                            std::string("damaged part splats: attribute '") + required + "' is missing");
+        const Imf::Header parsedSplats = parse(path, start, parts[splats], version);
+        header.dump.splatReplicates = value<int>(parsedSplats, kSplatReplicates).value_or(0);
+        header.dump.replicatesShare = true;
+        checkSplats(path, parsedSplats, header.dump);
+        header.splatPart = static_cast<int>(splats);
+    }
+
     // The tables of the parts follow the headers, in the order of the parts.
-    header.chunkTable = walker.position();
-    for (std::size_t i = 0; i <= part; ++i) {
+    std::uint64_t table = walker.position();
+    const std::size_t last = splats < parts.size() ? std::max(part, splats) : part;
+    for (std::size_t i = 0; i <= last; ++i) {
         const auto chunks = rawInt(start, findAttribute(parts[i], "chunkCount"));
-        if (i == part) {
+        if (i == part) header.chunkTable = table;
+        if (i == splats) header.splatTable = table;
+        if (i == part || i == splats) {
             if (chunks.value_or(header.dump.data.height) != header.dump.data.height)
                 throw Error(path, "expected a chunk for each of " + std::to_string(header.dump.data.height) +
                                       " rows, found chunkCount " + std::to_string(*chunks));
-            break;
+            table += std::uint64_t{8} * static_cast<std::uint64_t>(header.dump.data.height);
+            continue;
         }
         if (!chunks || *chunks < 0)
             throw Error(path, "damaged header: part " + std::to_string(i) + " lacks a valid chunkCount");
-        header.chunkTable += std::uint64_t{8} * static_cast<std::uint64_t>(*chunks);
+        table += std::uint64_t{8} * static_cast<std::uint64_t>(*chunks);
     }
     checkClaims(path, header, fileBytes);
 
@@ -403,9 +460,21 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
         text(kScene, dump.scene);
         text(kPixelFilter, dump.pixelFilter);
         text(kEffects, joined(dump.effects));
+        if (dump.replicatesShare) samples.insert(kReplicatesShare, Imf::IntAttribute(1));
         if (dump.seed) text(kSeed, std::to_string(*dump.seed));
         if (dump.samples) samples.insert(kSamples, Imf::DoubleAttribute(*dump.samples));
         samples.insert(kRenderSeconds, Imf::DoubleAttribute(dump.renderSeconds.value_or(0)));
+
+        std::vector<Imf::Header*> parts = {&beauty, &samples};
+        Imf::Header splats = common;
+        if (dump.splatReplicates > 0) {
+            splats.setName("splats");
+            splats.setType(Imf::SCANLINEIMAGE);
+            for (const auto& name : splatChannels(dump.splatReplicates))
+                splats.channels().insert(name, Imf::Channel(Imf::FLOAT));
+            splats.insert(kSplatReplicates, Imf::IntAttribute(dump.splatReplicates));
+            parts.push_back(&splats);
+        }
 
         MemoryOutput out(encoded.bytes);
         // The flags say: deep data, several parts, and names of up to 255 bytes.
@@ -415,7 +484,7 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
                                        Imf::LONG_NAMES_FLAG)};
         for (const std::uint32_t word : start) append(encoded.bytes, word);
         out.seekp(encoded.bytes.size());
-        for (Imf::Header* part : {&beauty, &samples}) {
+        for (Imf::Header* part : parts) {
             part->sanityCheck(false, true);
             part->writeTo(out);
         }

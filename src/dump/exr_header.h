@@ -16,6 +16,8 @@ struct FileHeader {
     int part = 0;                      ///< number of the deep part
     std::uint64_t chunkTable = 0;      ///< where the deep part's table of chunk positions is in the file
     std::uint64_t bytesPerSample = 0;  ///< of all channels together
+    int splatPart = 0;                 ///< number of the part `splats`, when dump.splatReplicates > 0,
+    std::uint64_t splatTable = 0;      ///< and where its table is
 };
 
 /// Reads the header of the file that starts with `start` and is `fileBytes` long. Returns nothing when the
@@ -30,7 +32,7 @@ struct EncodedHeader {
     std::size_t maxSamplesPerPixel = 0;  ///< a 32-bit integer
 };
 
-/// Header of the two-part file that DumpWriter writes, for the header `dump` with its channels sorted by
+/// Header of the file that DumpWriter writes, for the header `dump` with its channels sorted by
 /// name. Throws Error on what cannot be written.
 EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump);
 

@@ -173,6 +173,9 @@ std::string toText(const DumpInfo& info) {
     if (header.samples) line("asked for", numberText(*header.samples, "%g samples a pixel"));
     if (header.seed) line("seed", std::to_string(*header.seed));
     if (header.renderSeconds) line("traced in", numberText(*header.renderSeconds, "%.2f s"));
+    if (header.splatReplicates > 0)
+        line("splats", "of " + std::to_string(header.splatReplicates) +
+                           " replicates; reading adds them to the samples of their replicate");
     if (info.missing.empty()) line("missing", "nothing");
     for (const auto& part : info.missing) line("missing", part.what + ": " + part.cost);
     return text;
@@ -207,6 +210,7 @@ std::string toJson(const DumpInfo& info) {
     for (const auto& channel : header.channels)
         json["channels"].push_back({{"name", channel.name}, {"type", typeText(channel.type)}});
     if (header.samples) json["samplesAskedFor"] = *header.samples;
+    if (header.splatReplicates > 0) json["splatReplicates"] = header.splatReplicates;
     if (header.seed) json["seed"] = *header.seed;
     if (header.renderSeconds) json["renderSeconds"] = *header.renderSeconds;
     if (header.worldToCamera) json["worldToCamera"] = *header.worldToCamera;

@@ -32,6 +32,7 @@ bool isDeep(const std::string& path) {
 }
 
 std::string text(const std::string& value) { return "'" + value + "'"; }
+std::string text(int value) { return std::to_string(value); }
 std::string text(const std::optional<std::int64_t>& value) { return value ? std::to_string(*value) : "none"; }
 std::string text(const std::optional<double>& value) { return value ? std::to_string(*value) : "none"; }
 std::string text(const std::vector<std::string>& values) {
@@ -64,6 +65,7 @@ void checkSamePicture(const DumpReader& first, const DumpReader& part) {
     check("scene", a.scene, b.scene);
     check("seed", a.seed, b.seed);
     check("samples", a.samples, b.samples);
+    check("replicates with splats", a.splatReplicates, b.splatReplicates);
     check("pixel filter", a.pixelFilter, b.pixelFilter);
     check("effects", a.effects, b.effects);
     check("worldToCamera", a.worldToCamera, b.worldToCamera);
@@ -112,6 +114,7 @@ MergeReport mergeDumps(const std::vector<std::string>& paths, const std::string&
         seconds += part.header().renderSeconds.value_or(0);
     }
     DumpHeader header = first.header();
+    header.splatReplicates = 0;  // the samples hold them
     header.data = options.crop ? boundsOf(parts) : header.display;
     header.renderSeconds.reset();  // close() records it
     header.extra.erase(kInputsAttribute);

@@ -15,6 +15,7 @@
 #include "raw_file.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
+#include "variolux/dump/splats.h"
 
 // Why not OpenEXR's own reading classes: they want a table of pointers to every pixel of the image in every
 // channel, before anything in the file has been checked, and are slower (tests/bench/dump_bench.cpp).
@@ -172,6 +173,60 @@ struct DumpReader::Impl {
         return chunk;
     }
 
+    // Row y of the part `splats`: its channels one after the other.
+    std::vector<float> readSplats(int y) const {
+        const auto broken = [&](const std::string& what) {
+            throw Error(file.name(), "scanline " + std::to_string(y) + " of the part splats: " + what);
+        };
+        Bytes entry(8);
+        const auto row = static_cast<std::uint64_t>(std::int64_t{y} - header.dump.data.y);
+        file.readAt(header.splatTable + 8 * row, entry);
+        const std::uint64_t position = loadLong(entry.data());
+        std::array<unsigned char, 12> head{};
+        if (position == 0 || position > fileBytes || head.size() > fileBytes - position)
+            broken("missing or truncated");
+        file.readAt(position, head);
+        const std::uint64_t packed = loadWord(head.data() + 8);
+        if (static_cast<std::int32_t>(loadWord(head.data())) != header.splatPart ||
+            static_cast<std::int32_t>(loadWord(head.data() + 4)) != y)
+            broken("damaged: found the chunk of another part or row");
+        const std::uint64_t raw = std::uint64_t{12} *
+                                  static_cast<std::uint64_t>(header.dump.splatReplicates) *
+                                  static_cast<std::uint64_t>(header.dump.data.width);
+        if (packed > fileBytes - position - head.size() || raw > maxRawBytes(header.dump.compression, packed))
+            broken("truncated or damaged: " + std::to_string(packed) + " bytes cannot hold it");
+        const auto scratch = pool.borrow();
+        const auto unpacked = scratch->unpacker.unpack(read(position + head.size(), packed, *scratch), raw);
+        if (!unpacked) broken("damaged: it does not unpack");
+        std::vector<float> values(raw / 4);
+        std::memcpy(values.data(), unpacked->data(), raw);
+        return values;
+    }
+
+    // Adds the splats of its replicate to each sample. `replicate`: that channel's index in the band, or -1.
+    void addSplats(SampleBand& band, int replicate) const {
+        const auto width = static_cast<std::size_t>(band.width);
+        const auto replicates = static_cast<float>(header.dump.splatReplicates);
+        forRows(band.height, [&](std::size_t row) {
+            const int y = band.y + static_cast<int>(row);
+            const std::vector<float> splats = readSplats(y);
+            for (std::size_t x = 0; x < width; ++x)
+                for (auto i = band.offsets[row * width + x]; i < band.offsets[row * width + x + 1]; ++i) {
+                    const float r = replicate < 0 ? 0 : band.values[static_cast<std::size_t>(replicate)][i];
+                    if (!(r >= 0 && r < replicates))
+                        damaged(y, "damaged: a sample of replicate " + std::to_string(r) + ", of " +
+                                       std::to_string(header.dump.splatReplicates) + " with splats");
+                    for (int c = 0; c < 3; ++c) {
+                        const int channel =
+                            band.channel(std::string_view("RGB").substr(static_cast<std::size_t>(c), 1));
+                        if (channel >= 0)
+                            band.values[static_cast<std::size_t>(channel)][i] +=
+                                splats[SplatImages::plane(static_cast<int>(r), c) * width + x];
+                    }
+                }
+        });
+    }
+
     std::vector<Chunk> readCounts(int y, int rows) const {
         checkRows(y, rows);
         const auto first = static_cast<std::uint64_t>(std::int64_t{y} - header.dump.data.y);
@@ -206,6 +261,18 @@ std::uint64_t DumpReader::fileBytes() const { return impl_->fileBytes; }
 
 SampleBand DumpReader::read(int y, int rows, const std::vector<std::string>& channels) const {
     const DumpHeader& dump = impl_->header.dump;
+    const auto wants = [&](const char* name) {
+        return channels.empty() || std::ranges::find(channels, name) != channels.end();
+    };
+    const bool splats = dump.splatReplicates > 0 && (wants("R") || wants("G") || wants("B"));
+    if (splats && dump.splatReplicates > 1 && !wants("sample.replicate")) {
+        std::vector<std::string> more = channels;
+        more.emplace_back("sample.replicate");
+        SampleBand band = read(y, rows, more);
+        band.channels.pop_back();
+        band.values.pop_back();
+        return band;
+    }
     SampleBand band;
     band.x = dump.data.x;
     band.y = y;
@@ -246,6 +313,7 @@ SampleBand DumpReader::read(int y, int rows, const std::vector<std::string>& cha
             widen(raw->data() + sources[c].bytesBefore * chunk.samples(), sources[c].type, chunk.samples(),
                   band.values[c].data() + starts[row]);
     });
+    if (splats) impl_->addSplats(band, dump.splatReplicates > 1 ? band.channel("sample.replicate") : -1);
     return band;
 }
 

@@ -11,6 +11,7 @@
 #include <deque>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -98,6 +99,7 @@ struct Scratch {
     Bytes values;
 };
 struct RowChunks {
+    std::vector<float> means;  // of the flat part
     Bytes beauty, samples;
 };
 
@@ -126,6 +128,11 @@ void validate(const std::string& path, const DumpHeader& header) {
         if (!names.contains(name)) throw Error(path, std::string("a dump needs a channel ") + name);
     for (const auto* matrix : {&header.worldToCamera, &header.worldToNDC})
         if (*matrix && (*matrix)->size() != 16) throw Error(path, "expected matrices of 16 values");
+    if (header.splatReplicates < 0 || header.splatReplicates > kMostSplatReplicates)
+        throw Error(path, "expected at most " + std::to_string(kMostSplatReplicates) +
+                              " replicates of splats, found " + std::to_string(header.splatReplicates));
+    if (header.splatReplicates > 1 && !names.contains("sample.replicate"))
+        throw Error(path, "splats of several replicates need a channel sample.replicate");
     for (const auto& effect : header.effects)
         if (effect.empty() || effect.find(',') != std::string::npos)
             throw Error(path, "expected names of effects without commas, found '" + effect + "'");
@@ -148,7 +155,9 @@ struct DumpWriter::Impl {
         // Both parts have a chunk a row; their tables are filled in as chunks come.
         beautyTable = encoded.bytes.size();
         samplesTable = beautyTable + 8 * static_cast<std::uint64_t>(header.data.height);
-        end = samplesTable + 8 * static_cast<std::uint64_t>(header.data.height);
+        splatsTable = samplesTable + 8 * static_cast<std::uint64_t>(header.data.height);
+        end = splatsTable;
+        if (hasSplats()) end += 8 * static_cast<std::uint64_t>(header.data.height);
         worker = std::thread([this] { work(); });
     }
 
@@ -201,6 +210,7 @@ struct DumpWriter::Impl {
         if (nextRow != std::int64_t{header.data.y} + header.data.height)
             throw Error(file.path(), "closed before all rows were written: row " + std::to_string(nextRow) +
                                          " of " + windowText(header.data) + " is missing");
+        if (hasSplats()) writeFlatRows();
         Bytes value;
         append(value, static_cast<std::uint32_t>(std::min<std::uint64_t>(maxSamples, kMaxInt)));
         disk.writeAt(encoded.maxSamplesPerPixel, value);
@@ -211,6 +221,52 @@ struct DumpWriter::Impl {
         }
         disk.close();
         file.commit();
+    }
+
+    bool hasSplats() const { return header.splatReplicates > 0; }
+
+    void takeSplats(SplatImages given) {
+        if (!hasSplats() || given.data() != header.data || given.replicates() != header.splatReplicates)
+            throw Error(file.path(), "expected splats of " + std::to_string(header.splatReplicates) +
+                                         " replicates and " + windowText(header.data) + ", found " +
+                                         std::to_string(given.replicates()) + " and " +
+                                         windowText(given.data()));
+        splats = std::move(given);
+    }
+
+    // `splats`, and `beauty`, which waited for them.
+    void writeFlatRows() {
+        if (!splats) throw Error(file.path(), "closed before the splats were written");
+        const CpuTimer timer(cpu);
+        const auto scratch = pool.borrow();
+        const auto width = static_cast<std::size_t>(header.data.width);
+        const std::size_t beautyRow = beauty.size() * width;
+        Bytes beautyPositions, splatsPositions, chunk;
+        for (int row = 0; row < header.data.height; ++row) {
+            const int y = header.data.y + row;
+            const auto light = splats->row(y);
+            float* means = beautyMeans.data() + beautyRow * static_cast<std::size_t>(row);
+            for (std::size_t c = 0; c < beauty.size(); ++c) {
+                const auto& name = header.channels[static_cast<std::size_t>(beauty[c])].name;
+                const int rgb = name == "R" ? 0 : name == "G" ? 1 : name == "B" ? 2 : -1;
+                for (std::size_t x = 0; rgb >= 0 && x < width; ++x) {
+                    double sum = 0;
+                    for (int r = 0; r < header.splatReplicates; ++r)
+                        sum += static_cast<double>(light[SplatImages::plane(r, rgb) * width + x]);
+                    means[c * width + x] += static_cast<float>(sum / header.splatReplicates);
+                }
+            }
+            append(beautyPositions, end);
+            packFlat(0, y, {means, beautyRow}, *scratch, chunk);
+            disk.writeAt(end, chunk);
+            end += chunk.size();
+            append(splatsPositions, end);
+            packFlat(2, y, light, *scratch, chunk);
+            disk.writeAt(end, chunk);
+            end += chunk.size();
+        }
+        disk.writeAt(beautyTable, beautyPositions);
+        disk.writeAt(splatsTable, splatsPositions);
     }
 
     void rethrowFailure() const {
@@ -259,7 +315,8 @@ struct DumpWriter::Impl {
             const CpuTimer timer(cpu);
             RowChunks& to = chunks[static_cast<std::size_t>(row)];
             const auto scratch = pool.borrow();
-            encodeBeauty(band, static_cast<int>(row), *scratch, to.beauty);
+            meansOf(band, static_cast<int>(row), to.means);
+            if (!hasSplats()) packFlat(0, band.y + static_cast<int>(row), to.means, *scratch, to.beauty);
             encodeSamples(band, static_cast<int>(row), *scratch, to.samples);
         });
         const CpuTimer timer(cpu);
@@ -267,23 +324,27 @@ struct DumpWriter::Impl {
             maxSamples = std::max(maxSamples, band.offsets[p + 1] - band.offsets[p]);
         Bytes beautyPositions, samplesPositions;
         for (std::size_t row = 0; row < rows; ++row) {
-            append(beautyPositions, end);
-            disk.writeAt(end, chunks[row].beauty);
-            end += chunks[row].beauty.size();
+            if (hasSplats()) {
+                beautyMeans.insert(beautyMeans.end(), chunks[row].means.begin(), chunks[row].means.end());
+            } else {
+                append(beautyPositions, end);
+                disk.writeAt(end, chunks[row].beauty);
+                end += chunks[row].beauty.size();
+            }
             append(samplesPositions, end);
             disk.writeAt(end, chunks[row].samples);
             end += chunks[row].samples.size();
         }
         const auto firstRow = static_cast<std::uint64_t>(std::int64_t{band.y} - header.data.y);
-        disk.writeAt(beautyTable + 8 * firstRow, beautyPositions);
+        if (!hasSplats()) disk.writeAt(beautyTable + 8 * firstRow, beautyPositions);
         disk.writeAt(samplesTable + 8 * firstRow, samplesPositions);
     }
 
-    void encodeBeauty(const SampleBand& band, int row, Scratch& scratch, Bytes& chunk) const {
+    // A row of `beauty`, channel by channel.
+    void meansOf(const SampleBand& band, int row, std::vector<float>& means) const {
         const auto width = static_cast<std::size_t>(band.width);
         const std::uint64_t* offsets = band.offsets.data() + static_cast<std::size_t>(row) * width;
         const int alpha = findChannel(header, "A");
-        Bytes& means = scratch.values;
         means.clear();
         for (const int channel : beauty) {
             const auto& name = header.channels[static_cast<std::size_t>(channel)].name;
@@ -291,12 +352,18 @@ struct DumpWriter::Impl {
             const float* hits = values;  // without A, hits are what has a distance
             if (alpha >= 0) hits = band.values[static_cast<std::size_t>(alpha)].data();
             for (std::size_t x = 0; x < width; ++x)
-                append(means, pixelMean(values, name == "Z" ? hits : nullptr, offsets[x], offsets[x + 1]));
+                means.push_back(pixelMean(values, name == "Z" ? hits : nullptr, offsets[x], offsets[x + 1]));
         }
-        const auto packed = scratch.packer.pack(means);
+    }
+
+    static void packFlat(std::uint32_t part, int y, std::span<const float> values, Scratch& scratch,
+                         Bytes& chunk) {
+        scratch.values.clear();
+        for (const float v : values) append(scratch.values, v);
+        const auto packed = scratch.packer.pack(scratch.values);
         chunk.clear();
-        append(chunk, std::uint32_t{0});
-        append(chunk, static_cast<std::int32_t>(band.y + row));
+        append(chunk, part);
+        append(chunk, static_cast<std::int32_t>(y));
         append(chunk, static_cast<std::uint32_t>(packed.size()));
         chunk.insert(chunk.end(), packed.begin(), packed.end());
     }
@@ -340,9 +407,12 @@ struct DumpWriter::Impl {
     RawFile disk;
     std::uint64_t beautyTable = 0;  // from here on the worker's, while it runs
     std::uint64_t samplesTable = 0;
+    std::uint64_t splatsTable = 0;
     std::uint64_t end = 0;
     std::uint64_t maxSamples = 0;
     std::vector<RowChunks> chunks;
+    std::vector<float> beautyMeans;     // of all rows, where splats are to be added
+    std::optional<SplatImages> splats;  // the caller's
     std::atomic<std::int64_t> cpu{0};
     mutable Pool<Scratch> pool{[this] { return std::make_unique<Scratch>(header.compression); }};
 
@@ -363,6 +433,8 @@ void DumpWriter::write(SampleBand band) {
     impl_->check(band);
     impl_->enqueue(std::move(band));
 }
+
+void DumpWriter::writeSplats(SplatImages splats) { impl_->takeSplats(std::move(splats)); }
 
 void DumpWriter::close(double renderSeconds) { impl_->finish(renderSeconds); }
 

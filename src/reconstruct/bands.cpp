@@ -3,12 +3,27 @@
 #include <algorithm>
 #include <chrono>
 
+#include "rebin.h"
+
 namespace vlx {
 
 namespace {
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The channels of some rows; one sample for each replicate where its samples have light in common.
+SampleBand readBand(const DumpReader& reader, const ChannelChoice& channels, int y, int rows) {
+    const DumpHeader& header = reader.header();
+    if (!header.replicatesShare || findChannel(header, "sample.replicate") < 0)
+        return reader.read(y, rows, channels.names);
+    std::vector<std::string> names = channels.names;
+    names.emplace_back("sample.replicate");
+    SampleBand band = averageReplicates(reader.read(y, rows, names), channels.names.size());
+    band.channels.pop_back();
+    band.values.pop_back();
+    return band;
 }
 
 }  // namespace
@@ -48,7 +63,7 @@ void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int st
         const int rows = step * std::max(1, 16 / std::max(step, 1));
         const int next = step == 0 ? end : std::min(end, nextMultiple(y, step) - step + rows);
         const auto start = std::chrono::steady_clock::now();
-        const SampleBand band = reader.read(y, next - y, channels.names);
+        const SampleBand band = readBand(reader, channels, y, next - y);
         const double readTime = secondsSince(start);
         report.readSeconds += readTime;
         report.samples += static_cast<std::int64_t>(band.samples());

@@ -187,6 +187,8 @@ class Pipeline {
                 const auto position = static_cast<std::size_t>(layout_.position);
                 band = rebin(band, scale, position, position + 1);
             }
+            if (dump_.header().replicatesShare && layout_.replicate >= 0)
+                band = averageReplicates(band, static_cast<std::size_t>(layout_.replicate));
             watch_.addTo(report_.seconds["read"]);
             std::vector<GatherCounts> counts(static_cast<std::size_t>(rows));
             const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace vlx {
 
@@ -36,6 +37,31 @@ SampleBand rebin(const SampleBand& band, int scale, std::size_t xChannel, std::s
         for (std::size_t s = 0; s < to.size(); ++s) fine.values[c][to[s]] = band.values[c][s];
     }
     return fine;
+}
+
+SampleBand averageReplicates(const SampleBand& band, std::size_t replicateChannel) {
+    SampleBand means{band.x, band.y, band.width, band.height, {0}, band.channels, {}};
+    means.values.resize(band.values.size());
+    const std::vector<float>& replicate = band.values[replicateChannel];
+    std::vector<std::size_t> order;
+    for (std::size_t p = 0; p < band.pixels(); ++p) {
+        order.resize(static_cast<std::size_t>(band.offsets[p + 1] - band.offsets[p]));
+        std::iota(order.begin(), order.end(), static_cast<std::size_t>(band.offsets[p]));
+        std::stable_sort(order.begin(), order.end(),
+                         [&](std::size_t a, std::size_t b) { return replicate[a] < replicate[b]; });
+        for (std::size_t first = 0, end = 0; first < order.size(); first = end) {
+            while (end < order.size() && replicate[order[end]] == replicate[order[first]]) ++end;
+            end = std::max(end, first + 1);  // a NaN is a replicate of its own
+            for (std::size_t c = 0; c < band.values.size(); ++c) {
+                double sum = 0;
+                for (std::size_t i = first; i < end; ++i)
+                    sum += static_cast<double>(band.values[c][order[i]]);
+                means.values[c].push_back(static_cast<float>(sum / static_cast<double>(end - first)));
+            }
+        }
+        means.offsets.push_back(means.values[0].size());
+    }
+    return means;
 }
 
 }  // namespace vlx

@@ -14,10 +14,15 @@
 namespace vlx::render {
 namespace {
 
+thread_local std::uint64_t raysTested = 0;
+
 /// What Embree's filters get to see of a ray.
 struct RayContext : RTCIntersectContext {
-    explicit RayContext(std::uint32_t raySeed) : seed(raySeed) { rtcInitIntersectContext(this); }
+    explicit RayContext(std::uint32_t raySeed, bool both = false) : seed(raySeed), bothSides(both) {
+        rtcInitIntersectContext(this);
+    }
     std::uint32_t seed;
+    bool bothSides;
 };
 
 struct FilterData {
@@ -32,7 +37,7 @@ void filter(const RTCFilterFunctionNArguments* args) {
     const auto* context = reinterpret_cast<const RayContext*>(args->context);
     for (unsigned int i = 0; i < args->N; ++i) {
         if (args->valid[i] != -1) continue;
-        if (data.seeThroughBack) {
+        if (data.seeThroughBack && !context->bothSides) {
             const float facing = RTCHitN_Ng_x(args->hit, args->N, i) * RTCRayN_dir_x(args->ray, args->N, i) +
                                  RTCHitN_Ng_y(args->hit, args->N, i) * RTCRayN_dir_y(args->ray, args->N, i) +
                                  RTCHitN_Ng_z(args->hit, args->N, i) * RTCRayN_dir_z(args->ray, args->N, i);
@@ -192,9 +197,10 @@ Accelerator::Accelerator(const Scene& scene, const EffectSet& effects) : impl_(n
 
 Accelerator::~Accelerator() = default;
 
-std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed) const {
+std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed, bool bothSides) const {
     if (recorder_ != nullptr) recorder_->push_back({ray, 0, seed, false});
-    RayContext context(seed);
+    ++raysTested;
+    RayContext context(seed, bothSides);
     RTCRayHit r;
     r.ray = toEmbree(ray, std::numeric_limits<float>::infinity());
     r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -214,11 +220,14 @@ std::optional<Hit> Accelerator::intersect(const Ray& ray, std::uint32_t seed) co
 
 bool Accelerator::occluded(const Ray& ray, float distance, std::uint32_t seed) const {
     if (recorder_ != nullptr) recorder_->push_back({ray, distance, seed, true});
+    ++raysTested;
     RayContext context(seed);
     RTCRay r = toEmbree(ray, distance);
     rtcOccluded1(impl_->top, &context, &r);
     return r.tfar < 0;
 }
+
+std::uint64_t Accelerator::raysOnThisThread() { return raysTested; }
 
 void* Accelerator::embreeScene() const { return impl_->top; }
 

@@ -44,9 +44,19 @@ class Accelerator {
     Accelerator(const Accelerator&) = delete;
     Accelerator& operator=(const Accelerator&) = delete;
 
-    std::optional<Hit> intersect(const Ray& ray, std::uint32_t seed) const;
+    std::optional<Hit> intersect(const Ray& ray, std::uint32_t seed) const {
+        return intersect(ray, seed, false);
+    }
+    /// As intersect, but single-sided surfaces are met from behind too: a ray against the direction in which
+    /// cameras look, which decides what is seen through.
+    std::optional<Hit> intersectBothSides(const Ray& ray, std::uint32_t seed) const {
+        return intersect(ray, seed, true);
+    }
     /// Whether something lies on the ray before `distance`.
     bool occluded(const Ray& ray, float distance, std::uint32_t seed) const;
+
+    /// How many rays the calling thread has tested so far, in all scenes.
+    static std::uint64_t raysOnThisThread();
 
     /// For benchmarks: every ray from now on is appended to `rays` (null: no longer). One thread only.
     void record(std::vector<RecordedRay>* rays) { recorder_ = rays; }
@@ -54,6 +64,8 @@ class Accelerator {
     void* embreeScene() const;
 
   private:
+    std::optional<Hit> intersect(const Ray& ray, std::uint32_t seed, bool bothSides) const;
+
     struct Impl;
     std::unique_ptr<Impl> impl_;
     std::vector<RecordedRay>* recorder_ = nullptr;

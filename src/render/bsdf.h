@@ -42,6 +42,7 @@ struct BsdfSample {
     Rgb weight;          ///< f |cos wi| / pdf; 0: the path ends here
     float pdf = 0;       ///< of all lobes together; meaningless for delta lobes
     bool delta = false;  ///< perfectly smooth reflection or refraction
+    bool coat = false;   ///< a delta lobe's: the clear coat, not what lies beneath
 };
 
 /// Scattering at a point of a glTF surface, in the local frame whose z axis is the shading normal on the
@@ -87,6 +88,9 @@ class BasicBsdf {
     const Rgb& albedo() const { return albedo_; }
     /// Whether there is a lobe that is not a delta function, so that lights can be sampled.
     bool hasSmoothLobe() const { return !onlyDelta_; }
+    /// What coat and sheen let through of light towards wo: delta lobes beneath them are not reciprocal by
+    /// it.
+    float beneath() const { return base_; }
 
   private:
     enum Lobe : std::size_t { kCoat, kReflection, kDiffuse, kGlass, kSheen, kLobes };
@@ -109,7 +113,7 @@ class BasicBsdf {
         float reflectProbability;
     };
     GlassSplit splitAt(float cosH) const;
-    BsdfSample mirror(const Rgb& weight) const;
+    BsdfSample mirror(const Rgb& weight, bool coat) const;
     BsdfSample sampleMicrofacet(float alpha, Vec2 u) const;
     BsdfSample sampleGlass(Vec2 u, float choice) const;
     BsdfSample finish(const Vec3& wi) const;
@@ -392,9 +396,9 @@ BsdfSample BasicBsdf<F>::finish(const Vec3& wi) const {
 }
 
 template <Features F>
-BsdfSample BasicBsdf<F>::mirror(const Rgb& weight) const {
+BsdfSample BasicBsdf<F>::mirror(const Rgb& weight, bool coat) const {
     countEffect(Effect::Mirror);
-    return {{-wo_.x, -wo_.y, wo_.z}, weight, 0, true};
+    return {{-wo_.x, -wo_.y, wo_.z}, weight, 0, true, coat};
 }
 
 template <Features F>
@@ -426,7 +430,7 @@ BsdfSample BasicBsdf<F>::sample(Vec2 direction, float choice) const {
     rest -= probability_[kDiffuse];
     if constexpr (F.reflection) {
         if (rest < probability_[kReflection])
-            return smooth_ ? mirror(baseFresnel(wo_.z) / probability_[kReflection])
+            return smooth_ ? mirror(baseFresnel(wo_.z) / probability_[kReflection], false)
                            : sampleMicrofacet(alpha_, direction);
         rest -= probability_[kReflection];
     }
@@ -434,7 +438,7 @@ BsdfSample BasicBsdf<F>::sample(Vec2 direction, float choice) const {
         if (rest < probability_[kSheen]) return finish(cosineHemisphere(direction));
         rest -= probability_[kSheen];
         if (rest < probability_[kCoat])
-            return coatSmooth_ ? mirror(Rgb(coatFresnel(wo_.z) / probability_[kCoat]))
+            return coatSmooth_ ? mirror(Rgb(coatFresnel(wo_.z) / probability_[kCoat]), true)
                                : sampleMicrofacet(coatAlpha_, direction);
         rest -= probability_[kCoat];
     }

@@ -32,6 +32,19 @@ View::CameraFrame View::frameAt(const Transform& toWorld) const {
     return f;
 }
 
+View::CameraFrame View::frameDuring(float time) const {
+    if (frames_.size() == 1) return frames_.front();
+    countEffect(Effect::CameraMotion);
+    const float position = time * static_cast<float>(frames_.size() - 1);
+    const auto first = std::min(static_cast<std::size_t>(position), frames_.size() - 2);
+    const float t = position - static_cast<float>(first);
+    const CameraFrame& a = frames_[first];
+    const CameraFrame& b = frames_[first + 1];
+    const auto mix = [t](const Vec3& p, const Vec3& q) { return p * (1 - t) + q * t; };
+    return {mix(a.origin, b.origin), mix(a.corner, b.corner), mix(a.dx, b.dx),
+            mix(a.dy, b.dy),         mix(a.lensX, b.lensX),   mix(a.lensY, b.lensY)};
+}
+
 Ray View::ray(float x, float y, Vec2 lens, float time) const {
     const auto through = [&](const CameraFrame& f) -> Ray {
         const Vec3 along = f.corner + f.dx * x + f.dy * y;
@@ -41,16 +54,34 @@ Ray View::ray(float x, float y, Vec2 lens, float time) const {
         const Vec3 offset = f.lensX * d.x + f.lensY * d.y;
         return {f.origin + offset, normalized(along * focusDistance_ - offset), time};
     };
-    if (frames_.size() == 1) return through(frames_.front());
-    countEffect(Effect::CameraMotion);
-    const float position = time * static_cast<float>(frames_.size() - 1);
-    const auto first = std::min(static_cast<std::size_t>(position), frames_.size() - 2);
-    const float t = position - static_cast<float>(first);
-    const CameraFrame& a = frames_[first];
-    const CameraFrame& b = frames_[first + 1];
-    const auto mix = [t](const Vec3& p, const Vec3& q) { return p * (1 - t) + q * t; };
-    return through({mix(a.origin, b.origin), mix(a.corner, b.corner), mix(a.dx, b.dx), mix(a.dy, b.dy),
-                    mix(a.lensX, b.lensX), mix(a.lensY, b.lensY)});
+    return frames_.size() == 1 ? through(frames_.front()) : through(frameDuring(time));
+}
+
+View::Projection View::project(const Vec3& point, Vec2 lens, float time) const {
+    const CameraFrame f = frameDuring(time);
+    Vec3 offset;
+    float distance = 1;  // of the plane in focus; any, for a pinhole
+    if (lensRadius_ > 0) {
+        const Vec2 d = toDisk(lens);
+        offset = f.lensX * d.x + f.lensY * d.y;
+        distance = focusDistance_;
+    }
+    Projection p;
+    p.origin = f.origin + offset;
+    // The place on the plane, corner + x dx + y dy seen from the lens, times s is the direction: Cramer's
+    // rule.
+    const Vec3 direction = normalized(point - p.origin);
+    const Vec3 corner = f.corner * distance - offset, dx = f.dx * distance, dy = f.dy * distance;
+    const Vec3 normal = cross(dx, dy);  // its length: a pixel's area
+    const float facing = dot(direction, normal), ahead = dot(corner, normal);
+    if (!(facing * ahead > 0)) return p;
+    const float reach = ahead / facing;  // along the direction to the plane
+    const Vec3 place = direction * reach - corner;
+    const float area2 = lengthSquared(normal);
+    p.x = dot(cross(place, dy), normal) / area2;
+    p.y = dot(cross(dx, place), normal) / area2;
+    p.density = reach * reach / std::abs(facing);
+    return p;
 }
 
 std::vector<float> View::worldToCamera() const {

@@ -30,6 +30,16 @@ class View {
     /// `lens` in [0, 1)^2: the point on the lens. `time` in [0, 1): while the shutter is open.
     Ray ray(float x, float y, Vec2 lens, float time = 0) const;
 
+    /// A point of space as the camera sees it.
+    struct Projection {
+        float x = 0;  ///< raster position
+        float y = 0;
+        Vec3 origin;        ///< on the lens
+        float density = 0;  ///< pixels per steradian about the direction from `origin`; 0: not in front of it
+    };
+    /// The inverse of ray(): the raster position whose ray, from this point of the lens, goes through `point`.
+    Projection project(const Vec3& point, Vec2 lens, float time = 0) const;
+
     bool hasLens() const { return lensRadius_ > 0; }
     bool moves() const { return frames_.size() > 1; }
 
@@ -49,6 +59,7 @@ class View {
         Vec3 lensX, lensY;
     };
     CameraFrame frameAt(const Transform& toWorld) const;
+    CameraFrame frameDuring(float time) const;
 
     std::vector<CameraFrame> frames_;  ///< at equal steps of time, or one
     float lensRadius_;

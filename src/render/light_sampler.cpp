@@ -115,14 +115,21 @@ LightSample LightSampler::sampleAny(const Local& local, float choice, Vec2 u) co
             if (d2 == 0) return {};
             const float distance = std::sqrt(d2);
             const Vec3 direction = to / distance;
-            return {direction, distance * kReach,
-                    light.intensity * (light.cone(-direction) * light.window(d2) / d2), chosen.probability,
-                    true};
+            return {direction,
+                    distance * kReach,
+                    light.intensity * (light.cone(-direction) * light.window(d2) / d2),
+                    chosen.probability,
+                    true,
+                    static_cast<std::uint32_t>(chosen.light)};
         }
         case LightType::Directional:
             countEffect(Effect::PunctualLights);
-            return {-light.direction, std::numeric_limits<float>::infinity(), light.intensity,
-                    chosen.probability, true};
+            return {-light.direction,
+                    std::numeric_limits<float>::infinity(),
+                    light.intensity,
+                    chosen.probability,
+                    true,
+                    static_cast<std::uint32_t>(chosen.light)};
         case LightType::Sphere:
             s = sampleSphere(receiver, light, u);
             break;
@@ -139,6 +146,7 @@ LightSample LightSampler::sampleAny(const Local& local, float choice, Vec2 u) co
         }
     }
     s.pdf *= chosen.probability;
+    s.light = static_cast<std::uint32_t>(chosen.light);
     return s;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "effect_counters.h"
@@ -22,6 +23,8 @@ struct LightSample {
     Rgb radiance;        ///< for delta lights: irradiance across the beam
     float pdf = 0;       ///< per solid angle, choice of light included; for delta lights the latter only
     bool delta = false;
+    std::uint32_t light = 0;     ///< of the scene
+    std::uint32_t triangle = 0;  ///< of a mesh light's shape
 };
 
 /// Shadow rays end a little before the light.
@@ -68,6 +71,13 @@ class LightSampler {
                   float cosLight) const;
     float spherePdf(const Local& local, std::uint32_t light) const;
     float environmentPdf(const Local& local, const Vec3& direction) const;
+    /// The environment's number among the scene's lights, when it is one.
+    std::optional<std::size_t> environment() const {
+        if (environmentLight_ < 0) return std::nullopt;
+        return static_cast<std::size_t>(environmentLight_);
+    }
+    /// Probability with which sample() would have chosen a light.
+    float probability(const Local& local, std::size_t light) const;
 
   private:
     /// A triangle of a mesh light.
@@ -91,7 +101,6 @@ class LightSampler {
     void estimate(Local& local) const;
     void addTriangles(const Light& light);
     Choice choose(const Local& local, float u) const;
-    float probability(const Local& local, std::size_t light) const;
 
     LightSample sampleAny(const Local& local, float choice, Vec2 u) const;
     LightSample sampleMesh(const Receiver& receiver, std::size_t light, Vec2 u) const;
@@ -124,6 +133,7 @@ inline LightSample LightSampler::sampleMesh(const Receiver& receiver, std::size_
     const float cosLight = -dot(t.normal, s.direction);
     if (cosLight == 0 || (cosLight < 0 && !mesh.bothSides)) return {};
     s.pdf = t.density * d2 / std::abs(cosLight);
+    s.triangle = static_cast<std::uint32_t>(chosen.index);
     if (mesh.plain) {
         s.radiance = mesh.emission;
     } else {

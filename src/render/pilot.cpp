@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "bidirectional.h"
 #include "camera.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
@@ -120,6 +121,9 @@ PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, co
     const bool lens = options.path.effects.has(Effect::DepthOfField);
     const bool moves = options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion});
     const Window window = options.crop.value_or(Window{0, 0, options.width, options.height});
+    std::optional<BidirectionalTracer> both;
+    if (options.integrator == Integrator::Bidirectional)
+        both.emplace(scene, accelerator, view, window, options.path);
     PilotMeasure measure;
     double variance = 0;
     int rounds = 0;
@@ -135,12 +139,15 @@ PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, co
             const float y =
                 static_cast<float>(window.y) + std::floor(unitFloat(p.y) * static_cast<float>(window.height));
             std::array<double, 3> sum{}, squares{};
+            std::vector<Splat> splats;
             for (std::uint32_t s = 0; s < kPerPixel; ++s) {
                 const PathSampler sampler(hashOf(options.seed, 0x70696cu, rounds, i), s);
                 const Vec2 at = sampler.pair(dimension::kPixel);
                 const Vec2 u = lens ? sampler.pair(dimension::kLens) : Vec2{};
                 const float time = moves ? sampler.pair(dimension::kTime).x : 0;
-                const Rgb v = tracer.trace(view.ray(x + at.x, y + at.y, u, time), sampler).radiance;
+                const PathSample sample = both ? both->trace(x + at.x, y + at.y, u, time, sampler, splats)
+                                               : tracer.trace(view.ray(x + at.x, y + at.y, u, time), sampler);
+                const Rgb& v = sample.radiance;
                 const std::array<double, 3> rgb{v.x, v.y, v.z};
                 for (std::size_t c = 0; c < 3; ++c) {
                     sum[c] += rgb[c];

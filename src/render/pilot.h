@@ -22,7 +22,8 @@ struct PilotMeasure {
     double relativeVariance = 0;  ///< mean over pixels and channels of a sample's variance / (mean^2 + 0.01)
 };
 
-/// Traces pixels of a grid over the picture, 16 samples each, until that has taken `atLeast` seconds.
+/// Traces pixels of a grid over the picture, 16 samples each, until that has taken `atLeast` seconds. With
+/// bidirectional tracing the variance is not that of the picture, which has splats too.
 PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, const RenderOptions& options,
                           double atLeast);
 

@@ -7,6 +7,7 @@
 #include <ctime>
 #include <limits>
 
+#include "bidirectional.h"
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/image_io.h"
@@ -28,12 +29,19 @@ struct Record {
     PathSample sample;
 };
 
+struct RegionSplat {
+    int x, y;
+    std::uint32_t replicate;
+    Rgb radiance;
+};
+
 /// A region's samples while its band is traced.
 struct RegionResult {
     Window window;  ///< its pixels inside the data window
     std::vector<Record> records;
     std::array<std::uint32_t, kRegionSize * kRegionSize> counts{};
     std::vector<int> refined;
+    std::vector<RegionSplat> splats;
     std::uint64_t nonFinite = 0;
 };
 
@@ -57,8 +65,13 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     DumpHeader header;
     header.display = {0, 0, options.width, options.height};
     header.data = options.crop.value_or(header.display);
-    const bool replicates =
-        options.replicates > 1 || (options.earlier != nullptr && options.earlier->hasReplicates());
+    if (options.integrator == Integrator::Bidirectional) {
+        header.splatReplicates = options.splatReplicates();
+        header.replicatesShare = true;
+    }
+    if (!options.integratorReason.empty()) header.extra["integrator"] = options.integratorReason;
+    const bool replicates = header.splatReplicates > 1 || options.replicates > 1 ||
+                            (options.earlier != nullptr && options.earlier->hasReplicates());
     // What is added to a dump has the channels that are there.
     const RecordedFeatures features =
         options.plan && options.earlier == nullptr ? options.plan->features : RecordedFeatures{};
@@ -122,9 +135,10 @@ class ChannelArrays {
 
 class BandTracer {
   public:
-    BandTracer(const PathTracer& tracer, const View& view, const RenderOptions& options,
-               const DumpHeader& header)
+    BandTracer(const PathTracer& tracer, const BidirectionalTracer* both, const View& view,
+               const RenderOptions& options, const DumpHeader& header)
         : tracer_(tracer),
+          both_(both),
           view_(view),
           options_(options),
           header_(header),
@@ -166,6 +180,27 @@ class BandTracer {
 
     const std::vector<RegionResult>& regions() const { return regions_; }
 
+    /// Adds the band's splats, in the order of regions and samples. Returns how many overflowed.
+    std::uint64_t addTo(SplatImages& images) const {
+        const auto subpaths =
+            static_cast<double>(images.data().pixels()) * options_.spp / images.replicates();
+        const auto scale = static_cast<float>(1 / subpaths);
+        std::uint64_t nonFinite = 0;
+        for (const RegionResult& region : regions_)
+            for (const RegionSplat& s : region.splats) {
+                if (!isFinite(s.radiance)) {
+                    ++nonFinite;
+                    continue;
+                }
+                const Rgb v = s.radiance * scale;
+                const auto replicate = static_cast<int>(s.replicate);
+                images.at(s.x, s.y, replicate, 0) += v.x;
+                images.at(s.x, s.y, replicate, 1) += v.y;
+                images.at(s.x, s.y, replicate, 2) += v.z;
+            }
+        return nonFinite;
+    }
+
   private:
     SampleBand bandOf(const Window& rows) const {
         SampleBand band;
@@ -184,11 +219,12 @@ class BandTracer {
         }
     }
 
-    PathSample traced(const CameraSample& s) const {
+    PathSample traced(const CameraSample& s, std::vector<Splat>& splats) const {
         const PathSampler sampler(s.seed, s.index);
         const Vec2 lens = lens_ ? sampler.pair(dimension::kLens) : Vec2{};
         const float time = time_ ? sampler.pair(dimension::kTime).x : 0;
-        return tracer_.trace(view_.ray(s.x, s.y, lens, time), sampler);
+        return both_ != nullptr ? both_->trace(s.x, s.y, lens, time, sampler, splats)
+                                : tracer_.trace(view_.ray(s.x, s.y, lens, time), sampler);
     }
 
     /// Into the region's records, or straight into the band.
@@ -198,10 +234,16 @@ class BandTracer {
         out.records.clear();
         out.counts.fill(0);
         out.nonFinite = 0;
+        out.splats.clear();
+        std::vector<Splat> splats;
         const int left = rx * kRegionSize, top = ry * kRegionSize;
         const Shade shade = [&](const CameraSample& s) {
-            PathSample sample = traced(s);
+            PathSample sample = traced(s, splats);
             const bool outside = !rows.contains(s.column, s.row);  // of the band: another band's sample
+            for (const Splat& splat : splats)
+                out.splats.push_back({static_cast<int>(std::floor(splat.x)),
+                                      static_cast<int>(std::floor(splat.y)), s.replicate, splat.radiance});
+            splats.clear();
             if (!isFinite(sample.radiance)) {
                 out.nonFinite += !outside;
                 sample.radiance = {};
@@ -231,7 +273,8 @@ class BandTracer {
             sampleCounts(
                 out.window, [&](int, int) { return options_.spp; }, firstReplicate_, seed_, shade);
         } else {
-            sampleUniformly(out.window, options_.spp, options_.replicates, options_.seed, shade);
+            const int replicates = both_ != nullptr ? header_.splatReplicates : options_.replicates;
+            sampleUniformly(out.window, options_.spp, replicates, options_.seed, shade);
         }
     }
 
@@ -262,6 +305,7 @@ class BandTracer {
     }
 
     const PathTracer& tracer_;
+    const BidirectionalTracer* both_;
     const View& view_;
     const RenderOptions& options_;
     const DumpHeader& header_;
@@ -281,6 +325,16 @@ void RenderOptions::follow(const Plan& adopted) {
     path.leftOut = {};
     for (const PlannedEffect& e : adopted.effects)
         if (adopted.leftOut.has(e.effect) && tracerLeavesOut(e.effect)) path.leftOut.set(e.effect);
+}
+
+int RenderOptions::splatReplicates() const {
+    constexpr std::int64_t kMostBytes = std::int64_t{2} << 30;
+    const std::int64_t pixels = crop ? crop->pixels() : std::int64_t{width} * height;
+    const auto most = std::min<std::int64_t>(kMostSplatReplicates, kMostBytes / (12 * pixels));
+    if (replicates > 1 || spp == 1) return replicates <= most ? replicates : 0;
+    for (int n = static_cast<int>(std::min<std::int64_t>(most, spp)); n > 1; --n)
+        if (spp % n == 0) return n;
+    return 0;
 }
 
 std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
@@ -310,6 +364,22 @@ std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
         return "hierarchical sampling neither follows a sample map nor adds to a dump";
     if (replicates != 1 && (map != nullptr || earlier != nullptr))
         return "samples of a map, or added to a dump, are one randomisation, not replicates";
+    if (integrator == Integrator::Bidirectional) {
+        if (hierarchical || map != nullptr || earlier != nullptr)
+            return "bidirectional tracing takes as many samples in each pixel: it goes with neither "
+                   "hierarchical sampling nor a sample map nor an earlier dump";
+        if (band.count > 1)
+            return "bidirectional tracing, which this picture calls for, is not cut into bands: light of "
+                   "every "
+                   "sample falls anywhere; give all bands --integrator path";
+        if (path.leftOut.has(Effect::Caustics)) return "only path tracing leaves caustics out";
+        if (replicates > kMostSplatReplicates)
+            return "bidirectional tracing has at most " + std::to_string(kMostSplatReplicates) +
+                   " replicates";
+        if (splatReplicates() == 0)
+            return "bidirectional tracing wants a number of samples with a divisor of 2 to 64 (the "
+                   "replicates of its splats), whose images fit into 2 GiB";
+    }
     if (!(refinement.tolerance >= 0)) return "tolerance must be 0 or more";
     if (refinement.levels < 1 || refinement.levels > 5) return "levels must be 1 to 5";
     if (path.maxBounces < 0 || path.maxBounces > 1 << 16) return "max bounces must be 0 to 65536";
@@ -328,7 +398,13 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
         throw Error(path, "expected at most as many bands as rows, found " +
                               std::to_string(options.band.count) + " bands");
     DumpWriter writer(path, header);
-    BandTracer bands(tracer, view, options, header);
+    std::optional<BidirectionalTracer> both;
+    std::optional<SplatImages> splats;
+    if (options.integrator == Integrator::Bidirectional) {
+        both.emplace(scene, accelerator, view, window, options.path);
+        splats.emplace(window, header.splatReplicates);
+    }
+    BandTracer bands(tracer, both ? &*both : nullptr, view, options, header);
 
     const std::int64_t mostSpp = options.hierarchical
                                      ? std::int64_t{1} << (2 * (options.refinement.levels - 1))
@@ -356,6 +432,7 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
         SampleBand band = bands.trace({window.x, y, window.width, end - y}, regionDone);
         report.traceSeconds += std::chrono::duration<double>(Clock::now() - start).count();
         report.samples += band.samples();
+        if (splats) report.nonFinite += bands.addTo(*splats);
         for (const RegionResult& region : bands.regions()) {
             report.nonFinite += region.nonFinite;
             report.refinedCells.resize(std::max(report.refinedCells.size(), region.refined.size()));
@@ -368,6 +445,7 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     // Merging adds the bands' seconds up: the first one has the earlier ones.
     const bool first = options.earlier != nullptr && options.band.index == 0;
     const double before = first ? options.earlier->header().renderSeconds.value_or(0) : 0;
+    if (splats) writer.writeSplats(std::move(*splats));
     writer.close(before + report.traceSeconds);
     report.writeCpuSeconds = writer.cpuSeconds();
     report.traceCpuSeconds =

@@ -16,6 +16,8 @@
 
 namespace vlx::render {
 
+enum class Integrator { Path, Bidirectional };
+
 struct RenderOptions {
     int width = 512;  ///< of the whole picture, in pixels
     int height = 512;
@@ -30,6 +32,8 @@ struct RenderOptions {
     const SampleMap* map = nullptr;        ///< where the samples are wanted; spp is then their mean
     const EarlierDump* earlier = nullptr;  ///< whose samples are to be kept, before the new ones
     PathOptions path;
+    Integrator integrator = Integrator::Path;
+    std::string integratorReason;  ///< for the header, when not empty
     DumpCompression compression = DumpCompression::Rle;
     std::string version;       ///< of the program, for the header
     std::string inputs;        ///< for the header's kInputsAttribute (base/image_io.h)
@@ -38,13 +42,17 @@ struct RenderOptions {
     /// Adopts a plan, which applyPlan is to apply to the scene too.
     void follow(const Plan& adopted);
 
+    /// Bidirectional: in how many replicates light subpaths are kept apart: `replicates` or, when that is 1,
+    /// the greatest divisor of spp that is at most 64 and keeps their images within 2 GiB. 0: none does.
+    int splatReplicates() const;
+
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate(const Scene& scene) const;
 };
 
 struct RenderReport {
     std::uint64_t samples = 0;
-    std::uint64_t nonFinite = 0;  ///< samples whose radiance overflowed: written as 0, counted here
+    std::uint64_t nonFinite = 0;  ///< samples (and splats) whose radiance overflowed: written as 0
     double traceSeconds = 0;      ///< wall time of tracing
     double traceCpuSeconds = 0;   ///< processor time of the process, writing taken off
     double writeCpuSeconds = 0;   ///< processor time of compressing and writing
@@ -52,11 +60,12 @@ struct RenderReport {
 };
 
 /// Renders a scene into a dump. Works in bands of at most 16 rows: one is traced while the ones before are
-/// written, and memory does not grow with the picture's height. A sample depends on (seed, pixel, index)
-/// only: the file is the same, byte for byte, for any number of threads, and bands merge into the whole's
-/// file. What is sampled hierarchically is sampled by whole regions of 4 x 4 pixels: those that a band's
-/// border cuts are traced, and their refined cells counted, for both bands. Throws Error when there are more
-/// bands than rows and when the file cannot be written.
+/// written, and memory does not grow with the picture's height, but for splats: bidirectional tracing keeps
+/// 12 bytes a pixel and replicate. A sample depends on (seed, pixel, index) only: the file is the same, byte
+/// for byte, for any number of threads, and bands merge into the whole's file. What is sampled
+/// hierarchically is sampled by whole regions of 4 x 4 pixels: those that a band's border cuts are traced,
+/// and their refined cells counted, for both bands. Throws Error when there are more bands than rows and
+/// when the file cannot be written.
 RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, const std::string& path,
                         const RenderOptions& options, const Progress& progress = {});
 

@@ -26,6 +26,15 @@ inline constexpr std::uint32_t kChoice = 1;       ///< x: lobe, y: Russian roule
 inline constexpr std::uint32_t kLight = 2;        ///< point on the light
 inline constexpr std::uint32_t kLightChoice = 3;  ///< x: which light
 
+// Of light subpaths (bidirectional.h):
+inline constexpr std::uint32_t kEmission = 0x40000000u;        ///< x: which light
+inline constexpr std::uint32_t kEmissionOrigin = 0x40000001u;  ///< point on the light
+inline constexpr std::uint32_t kEmissionDirection = 0x40000002u;
+inline constexpr std::uint32_t kLightLens = 0x40000003u;  ///< point of the lens that the subpath is seen from
+inline constexpr std::uint32_t kLightOpacity = 0x40000004u;  ///< seeds the hash of opacity
+inline constexpr std::uint32_t kFirstLightBounce = 0x40000008u;
+inline constexpr std::uint32_t kPerLightBounce = 2;  ///< kDirection, kChoice
+
 constexpr std::uint32_t atBounce(int bounce, std::uint32_t use) {
     return kFirstBounce + static_cast<std::uint32_t>(bounce) * kPerBounce + use;
 }

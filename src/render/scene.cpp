@@ -117,6 +117,14 @@ Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& materi
     return mappedNorm > 1e-6f ? mapped / mappedNorm : normal;
 }
 
+SurfacePoint seenFrom(SurfacePoint point, const Vec3& toViewer) {
+    const Vec3 front = point.fromBehind ? -point.geometricNormal : point.geometricNormal;
+    point.fromBehind = dot(front, toViewer) < 0;
+    point.geometricNormal = point.fromBehind ? -front : front;
+    point.shadingNormal = facing(point.fromBehind ? -point.frontNormal : point.frontNormal, toViewer);
+    return point;
+}
+
 SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirection, float time) {
     return surfacePoint<kEveryFeature>(scene, hit, rayDirection, time);
 }

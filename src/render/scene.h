@@ -124,6 +124,7 @@ struct SurfacePoint {
     Vec3 position;
     Vec3 geometricNormal;  ///< unit, on the viewer's side
     Vec3 shadingNormal;    ///< unit, on the viewer's side, interpolated and normal-mapped
+    Vec3 frontNormal;      ///< the same on the front, not yet turned towards the viewer
     bool fromBehind = false;
     const Shape* shape = nullptr;
     const Material* material = nullptr;
@@ -131,6 +132,9 @@ struct SurfacePoint {
     TextureCoordinates uv;
     Rgb colour{1, 1, 1};  ///< vertex colour
 };
+
+/// The same point seen by another viewer, `toViewer` being the unit direction to him.
+SurfacePoint seenFrom(SurfacePoint point, const Vec3& toViewer);
 
 struct Hit;  // accelerator.h
 

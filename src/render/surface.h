@@ -74,6 +74,7 @@ SurfacePoint surfacePoint(const Scene& scene, const Hit& hit, const Vec3& rayDir
     }
     geometric = normalized(geometric);
     if (dot(shading, geometric) < 0) shading = -shading;
+    p.frontNormal = shading;
 
     p.fromBehind = dot(geometric, rayDirection) > 0;
     p.geometricNormal = p.fromBehind ? -geometric : geometric;

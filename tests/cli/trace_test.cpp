@@ -108,11 +108,39 @@ TEST(VlxTrace, FailuresAreExitOneNameTheFileAndLeaveNoOutput) {
     EXPECT_EQ(target.entries(), 0);
 }
 
+TEST(VlxTrace, BidirectionalDumpsHaveSplats) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "a.exr";
+    const ToolRun run = trace({kScene, "-o", out, "--width", "24", "--height", "20", "--spp", "4",
+                               "--integrator", "bidirectional"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_NE(run.err.find("integrator bidirectional: asked for"), std::string::npos) << run.err;
+    const DumpReader dump(out);
+    EXPECT_EQ(dump.header().splatReplicates, 4);
+    EXPECT_EQ(dump.header().extra.at("integrator"), "bidirectional: asked for");
+    EXPECT_EQ(runTool("vlx-krige", {out, "-o", folder / "b.exr"}).exitCode, 0);
+    for (const std::vector<std::string>& more : {std::vector<std::string>{"--hierarchical"},
+                                                 {"--append", out},
+                                                 {"--sample-map", out},
+                                                 {"--target-error", "0.1"},
+                                                 {"--spp", "67"},
+                                                 {"--effects", "auto,-caustics"}}) {
+        std::vector<std::string> arguments = {kScene, "-o",           folder / "c.exr", "--width",
+                                              "24",   "--integrator", "bidirectional"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const ToolRun refused = trace(arguments);
+        EXPECT_EQ(refused.exitCode, more[0] == "--sample-map" ? 1 : 2) << more[0] << refused.err;
+        EXPECT_FALSE(std::filesystem::exists(folder / "c.exr"));
+    }
+}
+
 TEST(VlxTrace, ExplainsWhatTheSceneCallsFor) {
     const ToolRun run = trace({kScene, "--explain=json"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
     const auto j = nlohmann::json::parse(run.out);
     ASSERT_EQ(j["effects"].size(), 20u);
+    EXPECT_TRUE(j["integrator"]["chosen"] == "path" || j["integrator"]["chosen"] == "bidirectional");
+    EXPECT_NE(j["integrator"]["reason"].get<std::string>().find("caustics"), std::string::npos);
     std::map<std::string, nlohmann::json> byName;
     for (const auto& e : j["effects"]) byName[e["name"]] = e;
     EXPECT_TRUE(byName["clearcoat"]["planned"].get<bool>());

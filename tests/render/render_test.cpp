@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "../base/temporary_folder.h"
+#include "choose_integrator.h"
 #include "test_scene.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/reader.h"
@@ -179,6 +181,129 @@ TEST(RenderOptions, ValidateNamesWhatIsWrong) {
     options = {};
     options.camera = 1;
     EXPECT_NE(options.validate(scene).value_or("").find("camera"), std::string::npos);
+}
+
+RenderOptions bidirectional() {
+    RenderOptions options = small(false);
+    options.integrator = Integrator::Bidirectional;
+    return options;
+}
+
+TEST(RenderDumpBidirectional, IsTheSameForAnyNumberOfThreads) {
+    const TemporaryFolder folder;
+    const Scene scene = room();
+    std::vector<SampleBand> bands;
+    for (const int threads : {1, 2, 8}) {
+        const ThreadLimit limit(threads);
+        const Accelerator accelerator(scene);
+        renderDump(scene, accelerator, folder / "a.exr", bidirectional());
+        bands.push_back(samplesOf(folder / "a.exr"));
+    }
+    EXPECT_EQ(DumpReader(folder / "a.exr").header().splatReplicates, 6);
+    for (std::size_t i = 1; i < bands.size(); ++i) EXPECT_EQ(bands[i].values, bands[0].values);
+}
+
+/// Mean luminance of a window, and its standard error, from replicates.
+std::pair<double, double> meanOf(const std::string& path, const Window& window) {
+    const DumpReader reader(path);
+    const SampleBand band = reader.read(window.y, window.height, {"R", "G", "B", "sample.replicate"});
+    std::map<float, double> sums;
+    for (std::size_t p = 0; p < band.pixels(); ++p) {
+        const int x = band.x + static_cast<int>(p % static_cast<std::size_t>(band.width));
+        if (x < window.x || x >= window.x + window.width) continue;
+        for (auto i = band.offsets[p]; i < band.offsets[p + 1]; ++i)
+            sums[band.values[3][i]] += luminance({band.values[0][i], band.values[1][i], band.values[2][i]});
+    }
+    double mean = 0, squares = 0;
+    const auto n = static_cast<double>(sums.size());
+    for (const auto& [replicate, sum] : sums) {
+        const double v = sum * n / static_cast<double>(window.pixels()) / reader.header().samples.value();
+        mean += v / n;
+        squares += v * v / n;
+    }
+    return {mean, std::sqrt((squares - mean * mean) / (n - 1))};
+}
+
+TEST(RenderDumpBidirectional, CropsAndPicturesOfBothIntegratorsAgree) {
+    const TemporaryFolder folder;
+    const Scene scene = room();
+    const Accelerator accelerator(scene);
+    RenderOptions options = bidirectional();
+    options.spp = 32;
+    renderDump(scene, accelerator, folder / "both.exr", options);
+    const Window crop{7, 3, 12, 9};
+    options.crop = crop;
+    options.seed = 8;
+    options.spp = 64;
+    renderDump(scene, accelerator, folder / "crop.exr", options);
+    options.integrator = Integrator::Path;
+    options.replicates = 32;
+    options.seed = 9;
+    renderDump(scene, accelerator, folder / "path.exr", options);
+    const auto [path, pathError] = meanOf(folder / "path.exr", crop);
+    for (const char* name : {"both.exr", "crop.exr"}) {
+        const auto [mean, error] = meanOf(folder / name, crop);
+        EXPECT_NEAR(mean, path, 4 * std::hypot(error, pathError)) << name;  // one false alarm in 3,000
+        EXPECT_LT(error, 0.1 * mean);
+    }
+}
+
+TEST(RenderDumpBidirectional, SaysWhatItCannotDo) {
+    const Scene scene = room();
+    const auto fault = [&](auto change) {
+        RenderOptions options = bidirectional();
+        change(options);
+        return options.validate(scene).value_or("");
+    };
+    EXPECT_EQ(fault([](RenderOptions&) {}), "");
+    EXPECT_NE(fault([](RenderOptions& o) { o.hierarchical = true; }).find("hierarchical"), std::string::npos);
+    EXPECT_NE(fault([](RenderOptions& o) { o.spp = 67; }).find("divisor"), std::string::npos);
+    EXPECT_NE(fault([](RenderOptions& o) { o.spp = o.replicates = 65; }).find("at most 64"),
+              std::string::npos);
+    EXPECT_NE(fault([](RenderOptions& o) { o.path.leftOut.set(Effect::Caustics); }).find("caustics"),
+              std::string::npos);
+}
+
+IntegratorChoice choiceFor(const Scene& scene, double samples) {
+    RenderOptions options;
+    options.width = options.height = 64;
+    const Plan plan = planEffects(scene, {0, 64, 64, 12, {}});
+    options.follow(plan);
+    const Accelerator accelerator(scene);
+    const IntegratorChoice a = chooseIntegrator(scene, accelerator, options, samples);
+    const IntegratorChoice b = chooseIntegrator(scene, accelerator, options, samples);
+    EXPECT_EQ(a.reason, b.reason);
+    return a;
+}
+
+TEST(ChooseIntegrator, FollowsLightThroughGlassWherePathsMissIt) {
+    for (const bool glass : {true, false}) {
+        TestScene t;
+        t.quad(t.material(TestScene::matte(Rgb(0.7f))), {-4, 0, 4}, {4, 0, 4}, {4, 0, -4}, {-4, 0, -4});
+        t.sphere(t.material(glass ? TestScene::glass(1.5f, 0) : TestScene::matte(Rgb(0.5f))), {0, 0.75f, 0},
+                 0.5f, 16);
+        Light l;
+        l.type = LightType::Sphere;
+        l.intensity = Rgb(10);
+        l.position = {-1.4f, 2.6f, -0.8f};
+        l.radius = 0.04f;
+        t.light(l);
+        t.camera({0, 2.6f, 4.4f}, {0, 0.3f, 0}, 0.7f);
+        const Scene scene = t.finish();
+        const IntegratorChoice choice = choiceFor(scene, 1e6);
+        EXPECT_EQ(choice.chosen, glass ? Integrator::Bidirectional : Integrator::Path) << choice.reason;
+        EXPECT_EQ(choice.tried, glass) << choice.reason;
+        EXPECT_EQ(choiceFor(scene, 100).chosen, Integrator::Path);
+    }
+}
+
+TEST(ChooseIntegrator, WithoutLightsIsPath) {
+    TestScene t;
+    t.box(t.material(TestScene::matte(Rgb(0.5f))), {-1, -1, -1}, {1, 1, 1});
+    t.camera({0, 0, 0.5f}, {0, 0, 0}, 1);
+    const IntegratorChoice choice = choiceFor(t.finish(), 1e6);
+    EXPECT_EQ(choice.chosen, Integrator::Path);
+    EXPECT_NE(choice.reason.find("no lights"), std::string::npos);
 }
 
 }  // namespace

@@ -123,7 +123,18 @@ def everything():
     return s
 
 
-SCENES = (one_box, diffuse_room, moving, everything)
+def small_light():
+    """The floor beside a glass ball: a small light shines through it, where paths from the camera hardly ever meet it."""
+    s = Scene()
+    s.camera((0.8, 1.9, 3.6), (0.8, 0, 0.5), 24)
+    floor(s, matte(s, (0.7, 0.66, 0.6)))
+    s.sphere(s.material((1, 1, 1), roughness=0, transmission=1), (0, 1.2, 0.1), 0.5, 28)
+    s.point_light((-1.4, 3.2, -0.8), (10, 9.5, 9))
+    s.json["nodes"][-1]["extras"] = {"radius": 0.04}
+    return s
+
+
+SCENES = (one_box, diffuse_room, moving, everything, small_light)
 
 
 def main(arguments):

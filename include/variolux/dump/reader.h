@@ -29,10 +29,11 @@ class DumpReader {
     std::uint64_t fileBytes() const;
 
     /// Samples of rows [y, y + rows), of the named channels only, in the given order (all of the header's
-    /// when empty). Decompression of the rows is spread over threads; the result does not depend on their
-    /// number. Throws Error naming the file, the scanline and the reason when a chunk is missing, truncated,
-    /// or inconsistent (counts that decrease, sizes that disagree); throws Error on rows outside the window
-    /// or unknown channels.
+    /// when empty). Where the dump has splats, R, G and B hold those of the sample's replicate: means of
+    /// samples are means of the whole light. Decompression of the rows is spread over threads; the result
+    /// does not depend on their number. Throws Error naming the file, the scanline and the reason when a
+    /// chunk is missing, truncated, or inconsistent (counts that decrease, sizes that disagree); throws Error
+    /// on rows outside the window or unknown channels.
     SampleBand read(int y, int rows, const std::vector<std::string>& channels = {}) const;
 
     /// Sample counts of rows [y, y + rows), row by row. Same errors.

@@ -6,14 +6,16 @@
 
 #include "variolux/dump/band.h"
 #include "variolux/dump/format.h"
+#include "variolux/dump/splats.h"
 
 namespace vlx {
 
 /// Writes a dump as a two-part OpenEXR file, streaming: a flat `beauty` part that every viewer shows (FLOAT
-/// R, G, B, A: the means of a pixel's finite samples, and Z: that of its hits, A > 0), and the deep scanline
-/// part `samples`. Compression runs on parallelFor's threads, started by a thread of the writer's own, never
-/// on the caller's; memory is a few bands, whatever the image's height. The bytes written do not depend on
-/// the bands' heights or the number of threads. The file appears under its name only after close().
+/// R, G, B, A: the means of a pixel's finite samples, and Z: that of its hits, A > 0), the deep scanline part
+/// `samples`, and with splats a flat part `splats`, of which `beauty` then holds the mean too. Compression
+/// runs on parallelFor's threads, started by a thread of the writer's own, never on the caller's; memory is a
+/// few bands, whatever the image's height (with splats, these and `beauty` too). The bytes written do not
+/// depend on the bands' heights or the number of threads. The file appears under its name only after close().
 ///
 /// Use: construct, write() bands of consecutive rows from the top to the bottom without gaps, close().
 /// Destroyed before close(), it leaves no file. Not for use from two threads at once.
@@ -31,6 +33,10 @@ class DumpWriter {
     /// its order. Throws Error on a band that does not, and on an earlier background write that failed (full
     /// disk) or a row of more samples than OpenEXR can hold (2^31 bytes).
     void write(SampleBand band);
+
+    /// The splats, once, before close(): required when the header has `splatReplicates`. Throws Error unless
+    /// their window and number are the header's.
+    void writeSplats(SplatImages splats);
 
     /// Waits for all bands, records `renderSeconds` in the header when positive, and gives the file its name.
     /// Throws Error when rows are missing or any write failed; then no file is left.
