@@ -245,7 +245,7 @@ std::string contents(const std::string& path) {
 TEST(MaxMemory, IsKeptAndTheImageIsTheSame) {
     const TemporaryFolder folder;
     const std::string dump = folder / "wide.exr", errors = folder / "errors";
-    writeWide(dump, 1000, 24, 64);
+    writeWide(dump, 800, 16, 64);
     const Arguments command = {dump, "--quality", "draft", "--threads", "2", "-q"};
     const Measured free = finish(start(command + Arguments{"-o", folder / "free.exr"}, errors));
     ASSERT_EQ(free.exitCode, 0) << contents(errors);
@@ -346,8 +346,8 @@ TEST(Replaced, DumpsAreAnErrorAndNoImage) {
     const TemporaryFolder folder;
     const std::string dump = folder / "wide.exr", errors = folder / "errors", out = folder / "out.exr";
     for (const bool cut : {true, false}) {
-        writeWide(dump, 300, 200, 4);
-        const pid_t child = start({dump, "-o", out, "--threads", "1", "-q"}, errors);
+        writeWide(dump, 200, 120, 4);
+        const pid_t child = start({dump, "-o", out, "--quality", "draft", "--threads", "1", "-q"}, errors);
         // Its image is begun: the dump is open.
         for (int i = 0; i < 3000 && folder.entries() < 3; ++i)
             std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -355,7 +355,7 @@ TEST(Replaced, DumpsAreAnErrorAndNoImage) {
         if (cut)
             fs::resize_file(dump, 5000);
         else
-            writeWide(dump, 300, 200, 1);
+            writeWide(dump, 200, 120, 1);
         EXPECT_EQ(finish(child).exitCode, 1);
         EXPECT_NE(contents(errors).find(dump), std::string::npos) << contents(errors);
         if (!cut) {

@@ -328,8 +328,8 @@ TEST(VlxCompareSweep, EndsWhatItStartedWhenItIsEnded) {
     const TemporaryFolder folder;
     const std::string pids = folder / "pids";
     const std::string program = std::string(VLX_BIN) + "/vlx-compare";
-    const std::string slow =
-        "slow=sleep 100 & echo $! $$ > " + pids + ".part; mv " + pids + ".part " + pids + "; wait";
+    const std::string slow = "slow=: {input} {output}; sleep 100 & echo $! $$ > " + pids + ".part; mv " +
+                             pids + ".part " + pids + "; wait";
     const pid_t child = ::fork();
     if (child == 0) {
         ::execl(program.c_str(), program.c_str(), "sweep", kDump.c_str(), "-o", (folder / "out").c_str(),
