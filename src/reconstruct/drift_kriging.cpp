@@ -31,8 +31,8 @@ constexpr int kFeatureRows = 128;  // and variances
 constexpr int kSumRows = 128;
 constexpr int kEstimateRows = 64;  // and moments
 
-// What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries that it
-// maps, and each thread's tiles.
+// What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries
+// that it maps, and each thread's tiles.
 constexpr std::uint64_t kProcessBytes = 150'000'000;
 constexpr std::uint64_t kThreadBytes = 8'000'000;
 
