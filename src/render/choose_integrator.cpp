@@ -16,8 +16,8 @@ constexpr int kRounds = 16;
 constexpr double kLeastSamples = 2e5;
 /// Time of a bidirectional tracer's ray, scattering included, over that of a path tracer's.
 constexpr double kRayCost = 1.25;
-/// How many times as fast bidirectional tracing must be: pilots err.
-constexpr double kMargin = 1.25;
+/// How many times as fast bidirectional tracing must be: pilots err, and kriging gains from more samples.
+constexpr double kMargin = 2;
 
 /// The picture, or its crop, with few pixels.
 struct SmallPicture {
