@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 
+#include "import_options.h"
 #include "pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
@@ -15,57 +16,37 @@ namespace vlx {
 
 namespace {
 
-ChannelMap parseMappings(const std::vector<std::string>& mappings) {
-    ChannelMap map;
-    for (const auto& mapping : mappings) {
-        const std::size_t sign = mapping.find('=');
-        if (sign == 0 || sign == std::string::npos || sign + 1 == mapping.size())
-            throw CLI::ValidationError("--map", "expected NAME=SOURCE, found '" + mapping + "'");
-        map[mapping.substr(0, sign)] = mapping.substr(sign + 1);
-    }
-    return map;
-}
-
 // What every importer has: an output, how it is written, and the report on standard output.
 struct ImportCommand {
     std::string dump;
     std::string renderer;
     DumpCompression compression = DumpCompression::Zips;
-    std::vector<std::string> mappings;
 
     void bindOutput(CLI::App& app) {
         app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
         app.add_option("--renderer", renderer, "Name of the renderer, if the files do not tell");
         addCompression(app, compression);
     }
-    void bindMap(CLI::App& app) {
-        app.add_option(
-               "--map", mappings,
-               "Take a dump's channel from an image's, for example R=Combined.R; goes before the preset")
-            ->type_name("NAME=SOURCE")
-            ->expected(1)
-            ->take_all();
-    }
     int print(const ImportReport& report, const std::string& what) const {
         if (isQuiet()) return kDone;
         std::cout << dump << ": " << what << "\n";
-        for (const auto& [channel, source] : report.mapped)
-            std::cout << "  " << channel << " from " << source << "\n";
-        for (const auto& name : report.ignored) std::cout << "  left out: " << name << "\n";
-        for (const auto& part : report.missing)
-            std::cout << "  lacks " << part.what << ": " << part.cost << "\n";
-        for (const auto& note : report.notes) std::cout << note << "\n";
+        std::cout << toText(report);
         return kDone;
     }
 };
 
-void bindCompanions(CLI::App& app, CompanionImages& with) {
-    app.add_option("--albedo", with.albedo, "Image of the albedo, if it is not in the same file");
-    app.add_option("--normal", with.normal, "Image of the normals, likewise");
-    app.add_option("--depth", with.depth, "Image of the distance, likewise");
+// Of the importers that keep further radiance.
+void bindRadiance(CLI::App& app, std::vector<std::string>& radiance) {
+    app.add_option("--radiance", radiance,
+                   "A further channel or layer of radiance to keep under its name, for vlx-krige --radiance; "
+                   "repeatable")
+        ->type_name("NAME")
+        ->expected(1)
+        ->take_all();
 }
 
 struct StackCommand : ImportCommand {
+    std::vector<std::string> mappings, radiance;
     std::vector<std::string> images;
     StackPreset preset = StackPreset::Auto;
 
@@ -90,12 +71,13 @@ struct StackCommand : ImportCommand {
             "How channels are named. cycles: Blender's multilayer files with denoising data;\n"
             "mitsuba: the aov integrator's; pbrt: the gbuffer film's; plain: R, G, B and a dump's own\n"
             "names; auto: what the names look like");
-        bindMap(app);
+        bindRadiance(app, radiance);
+        bindMap(app, mappings);
         bindOutput(app);
     }
 
     int run() {
-        const StackOptions options{preset, parseMappings(mappings), renderer, compression};
+        const StackOptions options{preset, parseMappings(mappings), radiance, renderer, compression};
         images = expandSequences(images);
         checkOutputName(dump, images);
         ImportReport report;
@@ -108,6 +90,7 @@ struct StackCommand : ImportCommand {
 };
 
 struct BuffersCommand : ImportCommand {
+    std::vector<std::string> mappings;
     std::string a, b;
     BufferOptions options;
 
@@ -124,7 +107,7 @@ struct BuffersCommand : ImportCommand {
         app.add_option("--variance", options.with.variance,
                        "Image of the variance of the mean of both halves (Tungsten's, RenderMan's mse)");
         bindCompanions(app, options.with);
-        bindMap(app);
+        bindMap(app, mappings);
         bindOutput(app);
     }
 
@@ -144,22 +127,18 @@ struct BuffersCommand : ImportCommand {
 };
 
 // Options of sources that have no samples but moments.
-void bindHalves(CLI::App& app, double& samples, bool& single, std::uint64_t& seed) {
-    app.add_option("--samples", samples, "Samples a pixel, where the variance is of single ones")
-        ->check(CLI::Range(1.0, 1e9));
+void bindHalves(CLI::App& app, bool& single, std::uint64_t& seed) {
     app.add_flag("--single", single,
                  "One sample a pixel; else two artificial halves whose noise has nothing in common");
     app.add_option("--seed", seed, "Of the halves")->capture_default_str();
 }
 
 struct MomentsCommand : ImportCommand {
-    enum class Meaning { Preset, Sample, Mean, Second };
-    enum class Colours { Preset, Rgb, Xyz };
     std::string image;
-    Meaning meaning = Meaning::Preset;
-    Colours colours = Colours::Preset;
+    MomentFlags flags;
     bool single = false;
-    MomentOptions options;
+    std::uint64_t seed = 0;
+    std::vector<std::string> radiance;
 
     void bind(CLI::App& app) {
         app.description("Make a dump of an image that has a variance for each pixel.");
@@ -167,45 +146,25 @@ struct MomentsCommand : ImportCommand {
             "Examples:\n"
             "  vlx-pack moments pbrt_gbuffer.exr -o room.exr\n"
             "  vlx-pack moments mitsuba.exr -o room.exr --samples 64\n"
-            "  vlx-pack moments color.exr -o room.exr --preset tungsten --variance colorVariance.exr");
+            "  vlx-pack moments color.exr -o room.exr --preset tungsten --variance colorVariance.exr\n"
+            "vlx-krige reads such images itself.");
         app.add_option("IMAGE", image, "Flat image")->required();
-        using enum MomentPreset;
-        addChoice(app, "--preset", options.preset,
-                  {{"auto", Auto},
-                   {"pbrt", Pbrt},
-                   {"mitsuba", Mitsuba},
-                   {"tungsten", Tungsten},
-                   {"arnold", Arnold},
-                   {"renderman", RenderMan},
-                   {"plain", Plain}},
-                  "Whose channels and whose idea of variance; plain: R, G, B and variance.R, .G, .B");
-        addChoice(app, "--variance-is", meaning,
-                  {{"preset", Meaning::Preset},
-                   {"sample", Meaning::Sample},
-                   {"mean", Meaning::Mean},
-                   {"second-moment", Meaning::Second}},
-                  "Of a single sample, of the pixel's mean, or the mean of squares");
-        addChoice(app, "--variance-of", colours,
-                  {{"preset", Colours::Preset}, {"rgb", Colours::Rgb}, {"xyz", Colours::Xyz}},
-                  "Colours that the variance belongs to: pbrt's default sensor and Mitsuba have X, Y, Z");
-        app.add_option("--variance", options.with.variance, "Image of the variance, if it is another file");
-        bindCompanions(app, options.with);
-        bindHalves(app, options.samples, single, options.seed);
-        bindMap(app);
+        flags.bind(app);
+        bindHalves(app, single, seed);
+        bindRadiance(app, radiance);
         bindOutput(app);
     }
 
     int run() {
-        options.map = parseMappings(mappings);
+        MomentOptions options = flags.options();
+        options.radiance = radiance;
         options.renderer = renderer;
         options.compression = compression;
         options.halves = !single;
-        if (meaning == Meaning::Sample) options.meaning = VarianceMeaning::OfSample;
-        if (meaning == Meaning::Mean) options.meaning = VarianceMeaning::OfMean;
-        if (meaning == Meaning::Second) options.meaning = VarianceMeaning::SecondMoment;
-        if (colours != Colours::Preset) options.xyz = colours == Colours::Xyz;
-        checkOutputName(dump, {image, options.with.variance, options.with.albedo, options.with.normal,
-                               options.with.depth});
+        options.seed = seed;
+        std::vector<std::string> files = flags.files();
+        files.push_back(image);
+        checkOutputName(dump, files);
         ImportReport report;
         {
             ProgressBar bar("reading");
@@ -232,7 +191,8 @@ struct BcdCommand : ImportCommand {
         app.add_option("FILE", files, "A raw file; or image, covariances and histogram, in this order")
             ->required()
             ->expected(1, 3);
-        bindHalves(app, options.samples, single, options.seed);
+        bindSamples(app, options.samples);
+        bindHalves(app, single, options.seed);
         bindOutput(app);
     }
 

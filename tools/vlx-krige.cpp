@@ -4,11 +4,14 @@
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "finished.h"
 #include "frames.h"
+#include "import_options.h"
 #include "progress_bar.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
@@ -16,6 +19,9 @@
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
 #include "variolux/compare/gaussian.h"
+#include "variolux/dump/bcd.h"
+#include "variolux/dump/image_layers.h"
+#include "variolux/dump/reader.h"
 #include "variolux/reconstruct/drift_kriging.h"
 #include "variolux/reconstruct/mean.h"
 #include "variolux/reconstruct/paper.h"
@@ -27,7 +33,10 @@ namespace {
 enum class Method { Krige, Paper, Mean, Gaussian };
 
 struct Options {
-    std::string dump;
+    std::string input;
+    vlx::MomentFlags moments;
+    std::string layersOf;
+    bool dropLayers = false;
     std::string image;
     Method method = Method::Krige;
     vlx::DriftKrigingOptions krige;
@@ -51,11 +60,21 @@ struct Options {
 
 void bind(CLI::App& app, Options& o) {
     o.commandLine = &app;
-    app.add_option("DUMP", o.dump, "Sample dump (deep OpenEXR) of any renderer")->required();
-    app.add_option("-o,--output", o.image,
-                   "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
-                   "deviation of the error of R, G, B)")
+    app.add_option(
+           "INPUT", o.input,
+           "Sample dump (deep OpenEXR) of any renderer, or a flat image with the variance of its pixels")
         ->required();
+    app.add_option(
+           "-o,--output", o.image,
+           "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
+           "deviation of the error of R, G, B). Of a flat OpenEXR image: a copy with all its layers and "
+           "parts, R, G, B, A and named radiance denoised, stddev added")
+        ->required();
+    app.add_option(
+           "--template", o.layersOf,
+           "Put the result into a copy of this flat OpenEXR file of the same size, as of a flat input")
+        ->option_text("IMAGE");
+    app.add_flag("--drop-layers", o.dropLayers, "Of a flat image: write only what is denoised, and stddev");
     vlx::addChoice(
         app, "--method", o.method,
         {{"krige", Method::Krige},
@@ -89,8 +108,8 @@ void bind(CLI::App& app, Options& o) {
         "krige: a further channel of the dump to use as drift, besides albedo, N and Z; repeatable");
     app.add_option(
         "--radiance", o.krige.radiance,
-        "krige: a further channel to estimate with the same weights as R, G, B (a light group): parts "
-        "still add up; repeatable");
+        "krige: a further channel or layer to estimate with the same weights as R, G, B (a light group): "
+        "parts still add up; repeatable");
     app.add_option("--scale", o.krige.scale,
                    "krige: pixels of the image along each axis for one of the dump; needs sample positions")
         ->check(CLI::Range(1, 4))
@@ -149,17 +168,68 @@ void bind(CLI::App& app, Options& o) {
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
         ->check(CLI::Range(0, 1024))
         ->capture_default_str();
+    o.moments.bind(app, "Flat images (--map also says where --template has R, G, B)");
     app.footer(
         "Examples:\n"
         "  vlx-krige samples.exr -o image.exr\n"
+        "  vlx-krige beauty.exr -o denoised.exr --radiance key --radiance fill\n"
+        "  vlx-krige samples.exr -o denoised.exr --template beauty.exr\n"
         "  vlx-krige samples.exr -o blurred.exr --method gaussian --sigma 1.5\n"
         "  vlx-krige room_####.exr -o kriged_####.exr --frames 1-100\n"
         "Samples that are not finite are left out and counted. Regions that cannot be kriged\n"
         "get their mean and are counted.");
 }
 
+// The samples of a dump, or those that the moments of a flat image stand for.
+std::unique_ptr<vlx::SampleSource> openInput(const Options& o, bool flat) {
+    if (!flat) {
+        auto dump = std::make_unique<vlx::DumpReader>(o.input);
+        const std::string given = o.dropLayers ? "--drop-layers" : o.moments.given(o.layersOf.empty());
+        if (!given.empty()) throw CLI::ValidationError(given + " goes with a flat image");
+        return dump;
+    }
+    vlx::MomentOptions options = o.moments.options();
+    options.radiance = o.krige.radiance;
+    for (const std::string& feature : o.krige.features) options.map.try_emplace(feature, feature);
+    return vlx::openMoments(o.input, options);
+}
+
+// The channels of an image that a predicate holds for.
+vlx::Image channelsOf(const vlx::Image& image, const std::function<bool(const std::string&)>& wanted) {
+    std::vector<int> taken;
+    std::vector<std::string> names;
+    for (int c = 0; c < image.channelCount(); ++c)
+        if (const std::string& name = image.channels[static_cast<std::size_t>(c)]; wanted(name)) {
+            taken.push_back(c);
+            names.push_back(name);
+        }
+    vlx::Image result(image.data, names);
+    result.display = image.display;
+    for (int row = 0; row < image.data.height; ++row)
+        for (int col = 0; col < image.data.width; ++col) {
+            const float* from = image.at(col, row);
+            std::transform(taken.begin(), taken.end(), result.at(col, row), [&](int c) { return from[c]; });
+        }
+    return result;
+}
+
+// Which layers of the file to be copied the image replaces: of a flat input those that it was made of.
+vlx::ChannelMap replacedLayers(const Options& o, const std::string& original,
+                               const vlx::SampleSource& source) {
+    vlx::ChannelMap map;
+    if (const auto* moments = dynamic_cast<const vlx::ImportedSamples*>(&source);
+        original == o.input && moments)
+        map = moments->report().mapped;
+    else
+        map = vlx::findRadiance(original, o.moments.options().map);
+    std::erase_if(map, [](const auto& entry) {
+        return entry.first != "R" && entry.first != "G" && entry.first != "B" && entry.first != "A";
+    });
+    return map;
+}
+
 /// By the methods that hold the image whole.
-vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
+vlx::Reconstruction reconstruct(const Options& o, const vlx::SampleSource& dump,
                                 const vlx::Progress& progress) {
     switch (o.method) {
         case Method::Krige: {
@@ -176,11 +246,8 @@ vlx::Reconstruction reconstruct(const Options& o, const vlx::DumpReader& dump,
     }
     vlx::Reconstruction result = vlx::reconstructMean(dump, progress);
     // The error of a filtered pixel is mostly bias, which this filter cannot know: no stddev layer.
-    vlx::Image radiance(result.image.data, {"R", "G", "B"});
-    radiance.display = result.image.display;
-    for (int row = 0; row < radiance.data.height; ++row)
-        for (int col = 0; col < radiance.data.width; ++col)
-            std::copy_n(result.image.at(col, row), 3, radiance.at(col, row));
+    const vlx::Image radiance = channelsOf(
+        result.image, [](const std::string& name) { return name == "R" || name == "G" || name == "B"; });
     result.image = vlx::gaussianFilter(radiance, o.sigma).image;
     return result;
 }
@@ -213,17 +280,58 @@ std::uint64_t parseMemory(const std::string& text) {
     return static_cast<std::uint64_t>(value * (unit == 'G' ? 1e9 : 1e6));
 }
 
+// On standard error: what became of the layers; warnings also where the report is JSON.
+void tell(const vlx::SampleSource& source, const std::string& original, const vlx::LayerCopy& copied,
+          bool warningsOnly) {
+    std::string text;
+    if (const auto* imported = dynamic_cast<const vlx::ImportedSamples*>(&source);
+        imported && !warningsOnly) {
+        vlx::ImportReport report = imported->report();
+        report.ignored.clear();
+        text += vlx::toText(report);
+    }
+    if (!warningsOnly && !original.empty()) {
+        text += "a copy of " + original + " with";
+        for (const auto& [channel, from] : copied.replaced) text += " " + channel;
+        text += " denoised";
+        for (const auto& name : copied.added) text += ", " + name + " added";
+        text += "\n";
+    }
+    if (!copied.recompressed.empty())
+        text += "WARNING: " + copied.recompressed +
+                " would lose bits of untouched layers once more: their part is ZIP now.\n";
+    if (copied.overflows > 0)
+        text += "WARNING: " + std::to_string(copied.overflows) +
+                " values beyond 65504, the range of half channels, are stored as 65504.\n";
+    if (text.empty()) return;
+    text.pop_back();
+    vlx::say(text);
+}
+
 void kriged(const Options& o, const vlx::Progress& progress) {
     if (!o.samplingMap.empty()) {
-        vlx::checkOutputName(o.samplingMap, {o.dump, o.image});
+        vlx::checkOutputName(o.samplingMap, {o.input, o.image, o.layersOf});
         if (o.samplingMap == o.image)
             throw CLI::ValidationError("--sampling-map", "expected another name than the output's");
     }
-    vlx::checkOutputName(o.image, {o.dump});
+    std::vector<std::string> files = o.moments.files();
+    files.insert(files.end(), {o.input, o.layersOf});
+    vlx::checkOutputName(o.image, files);
+    const bool flat = vlx::isFlatImage(o.input);
+    // What the result becomes a part of.
+    std::string original = o.layersOf;
+    if (original.empty() && flat && !o.dropLayers && vlx::isOpenExr(o.input)) original = o.input;
+    if (!original.empty() && (!o.band.empty() || o.krige.scale != 1 || !o.maxMemory.empty()))
+        throw CLI::ValidationError(
+            "--band, --scale and --max-memory go with --drop-layers or a dump, without --template");
     vlx::ImageWriteOptions write;
     write.attributes["Software"] = "vlx-krige";
-    vlx::InputsHash hash(*o.commandLine, {"DUMP"});
-    hash.addFile(o.dump);
+    vlx::InputsHash hash(*o.commandLine,
+                         {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"});
+    for (const std::string& file : files) {
+        hash.add("file", file.empty() ? "none" : "given");  // which of them
+        hash.addFile(file);
+    }
     const std::string inputs = write.attributes[vlx::kInputsAttribute] = hash.text(o.krige.band);
     std::vector<std::string> outputs = {o.image};
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
@@ -233,9 +341,13 @@ void kriged(const Options& o, const vlx::Progress& progress) {
         return;
     }
     { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
-    const vlx::DumpReader dump(o.dump);
+    const std::unique_ptr<vlx::SampleSource> source = openInput(o, flat);
+    const vlx::SampleSource& dump = *source;
+    const vlx::ChannelMap replaced = original.empty() ? vlx::ChannelMap() : replacedLayers(o, original, dump);
+    vlx::LayerCopy copied;
     vlx::ReconstructionReport report;
-    if (o.method == Method::Krige && o.filter == vlx::PixelFilter::Box && o.samplingMap.empty()) {
+    if (original.empty() && o.method == Method::Krige && o.filter == vlx::PixelFilter::Box &&
+        o.samplingMap.empty()) {
         const vlx::Image outline = vlx::driftKrigingOutline(dump, o.krige);
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
         report = vlx::reconstructDriftKriging(
@@ -250,11 +362,19 @@ void kriged(const Options& o, const vlx::Progress& progress) {
         // Both files or none: the image gets its name only when the JSON is complete.
         std::optional<vlx::OutputFile> diagnostics;
         if (o.diagnostics) writeText(diagnostics.emplace(o.image + ".json"), vlx::toJson(result));
-        vlx::writeImage(o.image, result.image, write);
+        if (original.empty())
+            vlx::writeImage(o.image, result.image, write);
+        else
+            copied = vlx::copyWithLayers(
+                original, o.image,
+                channelsOf(result.image,
+                           [&](const std::string& name) { return name != "A" || replaced.contains("A"); }),
+                replaced, {{vlx::kInputsAttribute, inputs}});
         if (diagnostics) diagnostics->commit();
         if (!o.samplingMap.empty()) vlx::writeImage(o.samplingMap, map, write);
         report = std::move(result.report);
     }
+    tell(dump, original, copied, o.json);
     if (o.json) {
         std::printf("%s\n", vlx::toJson(report).c_str());
     } else if (std::string text = vlx::toText(report); !text.empty()) {
@@ -298,13 +418,14 @@ int run(Options& o) {
         kriged(o, bar);
         return vlx::kDone;
     }
-    vlx::requireFramePlace("DUMP", o.dump);
+    vlx::requireFramePlace("INPUT", o.input);
     vlx::requireFramePlace("--output", o.image);
     if (!o.samplingMap.empty()) vlx::requireFramePlace("--sampling-map", o.samplingMap);
     vlx::forEachFrame(vlx::parseFrames(o.frames), bar, [&](int frame, const vlx::Progress& progress) {
         Options one = o;
-        for (std::string* name : {&one.dump, &one.image, &one.samplingMap})
-            *name = vlx::frameName(*name, frame);
+        std::vector<std::string*> names = one.moments.fileNames();
+        names.insert(names.end(), {&one.input, &one.image, &one.samplingMap, &one.layersOf});
+        for (std::string* name : names) *name = vlx::frameName(*name, frame);
         kriged(one, progress);
     });
     return vlx::kDone;

@@ -23,11 +23,11 @@ ImportReport importBcdStatistics(const std::string& image, const std::string& co
                                  const BcdOptions& options, const Progress& progress) {
     std::vector<std::string> paths = {image, covariance};
     if (!histogram.empty()) paths.push_back(histogram);
-    FlatImages images(paths);
+    auto opened = std::make_unique<FlatImages>(paths);
+    FlatImages& images = *opened;
 
     ImportReport report;
-    MomentSource source;
-    source.images = &images;
+    MomentChannels source;
     source.meaning = VarianceMeaning::OfSample;
     source.samples = options.samples;
     const auto colours = findTriple(images.channels(0), {""});
@@ -59,9 +59,11 @@ ImportReport importBcdStatistics(const std::string& image, const std::string& co
         throw Error(covariance, "expected the number of samples a pixel, or the histogram that has it");
     }
     report.notes.push_back("The covariances are those of single samples.");
-    writeMoments(source, {dump, options.renderer, options.halves, options.seed, options.compression}, report,
-                 progress);
-    return report;
+    const MomentRows samples(std::move(opened), std::move(source),
+                             {options.renderer, options.halves, options.seed, options.compression},
+                             std::move(report));
+    writeSamples(samples, dump, progress);
+    return samples.report();
 }
 
 }  // namespace vlx

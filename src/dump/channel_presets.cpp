@@ -92,6 +92,13 @@ std::optional<std::array<std::string, 3>> findTriple(const Names& names, const N
     return std::nullopt;
 }
 
+std::vector<std::string> radianceChannels(const std::vector<std::string>& names, const std::string& name) {
+    if (contains(names, name)) return {name};
+    if (const auto triple = name.empty() ? std::nullopt : findTriple(names, {name}))
+        return {triple->begin(), triple->end()};
+    return {};
+}
+
 std::optional<std::string> findNumber(const Names& names, const Names& layers) {
     for (const auto& layer : layers)
         for (const char* end : {"", ".Z", ".z", ".T", ".V", ".Y", ".R", ".r", ".X"})
@@ -139,6 +146,15 @@ ChosenMap chooseStackMap(const std::string& path, const Names& names, const Stac
         if (channel == kReplicate)
             throw Error(path, "sample.replicate cannot be mapped: it is the image's number");
         chosen.map[channel] = source;
+    }
+    for (const auto& wanted : options.radiance) {
+        const Names parts = radianceChannels(names, wanted);
+        if (parts.empty())
+            throw Error(path,
+                        "expected a channel or layer of radiance " + wanted + ", found " + listed(names));
+        for (const auto& part : parts)
+            if (!chosen.map.try_emplace(part, part).second)
+                throw Error(path, part + " is taken already and cannot be named as radiance");
     }
     for (const char* needed : {"R", "G", "B"})
         if (!chosen.map.contains(needed))

@@ -3,17 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <fstream>
 
 #include "exr_header.h"
 #include "header_walker.h"
 #include "little_endian.h"
 #include "raw_file.h"
 #include "variolux/base/error.h"
+#include "variolux/dump/import.h"
 
 namespace vlx {
 
 namespace {
 
+constexpr std::uint32_t kMagic = 20000630;
+constexpr std::uint32_t kDeepData = 0x800;
 // Headers are longer only with pictures in them (previews), which are small.
 constexpr std::uint64_t kMaxHeader = std::uint64_t{64} << 20;
 // zlib reaches 1032, the run lengths of others less. DWA is lossy: of an area of one colour it keeps next to
@@ -98,13 +102,20 @@ class PartCheck {
 
 }  // namespace
 
+bool isFlatImage(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::array<unsigned char, 8> start{};
+    if (!file.read(reinterpret_cast<char*>(start.data()), start.size())) return false;
+    return loadWord(start.data()) != kMagic || (loadWord(start.data() + 4) & kDeepData) == 0;
+}
+
 void checkFlatHeader(const std::string& path) {
     const RawFile file(path, path, RawFile::Mode::Read);
     const std::uint64_t size = file.size();
     Bytes start(std::min<std::uint64_t>(size, 1 << 16));
     file.readAt(0, start);
-    if (start.size() < 8 || loadWord(start.data()) != 20000630) return;
-    if ((loadWord(start.data() + 4) & 0x800) != 0)
+    if (start.size() < 8 || loadWord(start.data()) != kMagic) return;
+    if ((loadWord(start.data() + 4) & kDeepData) != 0)
         throw Error(path, "expected a flat image, found deep samples: this is a dump already");
     const bool multiPart = (loadWord(start.data() + 4) & 0x1000) != 0;
     for (;;) {

@@ -30,6 +30,13 @@ std::string reason(std::string own) {
     return own.empty() ? "unknown reason" : own;
 }
 
+void checkRowLength(const std::string& path, const OIIO::ImageSpec& spec) {
+    const std::int64_t rows = std::max(spec.tile_height, 1);
+    if (std::int64_t{spec.width} * spec.nchannels * rows > kMaxStripValues)
+        throw Error(path, "expected rows of at most 2^28 values, found " + std::to_string(spec.width) +
+                              " pixels of " + std::to_string(spec.nchannels) + " channels");
+}
+
 std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status))
@@ -41,10 +48,7 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
     if (spec.deep) throw Error(path, "expected a flat image, found deep samples: this is a dump already");
     if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 || spec.depth > 1)
         throw Error(path, "expected a flat image with pixels and channels, found none");
-    const std::int64_t rows = std::max(spec.tile_height, 1);
-    if (std::int64_t{spec.width} * spec.nchannels * rows > kMaxStripValues)
-        throw Error(path, "expected rows of at most 2^28 values, found " + std::to_string(spec.width) +
-                              " pixels of " + std::to_string(spec.nchannels) + " channels");
+    checkRowLength(path, spec);
     return input;
 }
 
@@ -65,70 +69,54 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
     return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// What is taken from one image, in rows of interleaved values.
-class FlatImages::Source {
-  public:
-    Source(std::string path, bool keepOpen) : path_(std::move(path)), keepOpen_(keepOpen) {
-        auto input = vlx::open(path_);
-        spec_ = input->spec();
-        data_ = dataWindow(spec_);
-        display_ = displayWindow(spec_);
-        if (keepOpen_) input_ = std::move(input);
-    }
+std::string partChannel(int part, const std::string& partName, const std::string& channel) {
+    if (part == 0 || partName.empty() || channel.starts_with(partName + ".")) return channel;
+    return partName + "." + channel;
+}
 
-    std::size_t take(const std::string& name) {
-        const auto& names = spec_.channelnames;
-        const auto found = std::find(names.begin(), names.end(), name);
-        if (found == names.end())
-            throw Error(path_, "expected a channel " + name + ", found " + listed(names));
-        const int channel = static_cast<int>(found - names.begin());
+// What is taken from one part of an image, in rows of interleaved values.
+class FlatPart {
+  public:
+    FlatPart(int number, const OIIO::ImageSpec& spec) : number_(number), spec_(spec) {}
+
+    const OIIO::ImageSpec& spec() const { return spec_; }
+
+    void take(int channel) {
         begin_ = std::min(begin_, channel);
         end_ = std::max(end_, channel + 1);
-        channels_.push_back(channel);
-        return channels_.size() - 1;
     }
 
-    void read(int y, int rows) {
-        if (channels_.empty()) return;
-        auto input = keepOpen_ ? std::move(input_) : vlx::open(path_);
+    // Returns whether all went well.
+    bool read(OIIO::ImageInput& input, int y, int rows) {
+        if (begin_ >= end_) return true;
         values_.resize(rowValues() * static_cast<std::size_t>(rows));
-        const bool whole = spec_.tile_width > 0
-                               ? readTiles(*input, y, rows)
-                               : input->read_scanlines(0, 0, y, y + rows, 0, begin_, end_,
-                                                       OIIO::TypeDesc::FLOAT, values_.data());
-        if (!whole)
-            throw Error(path_, "rows " + std::to_string(y) + " to " + std::to_string(y + rows - 1) + ": " +
-                                   reason(input->geterror()));
-        for (const float value : values_)
-            hash_ = (hash_ ^ std::bit_cast<std::uint32_t>(value)) * 1099511628211u;
-        if (keepOpen_) input_ = std::move(input);
+        return spec_.tile_width > 0 ? readTiles(input, y, rows)
+                                    : input.read_scanlines(number_, 0, y, y + rows, 0, begin_, end_,
+                                                           OIIO::TypeDesc::FLOAT, values_.data());
     }
 
-    float value(std::size_t pixel, std::size_t index) const {
+    const std::vector<float>& values() const { return values_; }
+
+    float value(std::size_t pixel, int channel) const {
         return values_[pixel * static_cast<std::size_t>(end_ - begin_) +
-                       static_cast<std::size_t>(channels_[index] - begin_)];
+                       static_cast<std::size_t>(channel - begin_)];
     }
-    const std::string& path() const { return path_; }
-    const OIIO::ImageSpec& spec() const { return spec_; }
-    const Window& data() const { return data_; }
-    const Window& display() const { return display_; }
-    std::uint64_t hash() const { return hash_; }
 
   private:
     std::size_t rowValues() const {
-        return static_cast<std::size_t>(data_.width) * static_cast<std::size_t>(end_ - begin_);
+        return static_cast<std::size_t>(spec_.width) * static_cast<std::size_t>(end_ - begin_);
     }
 
     // Tiles come in whole rows of tiles; the one read last is kept for the next band.
     bool readTiles(OIIO::ImageInput& input, int y, int rows) {
         for (int row = y; row < y + rows; ++row) {
-            const int first = row - (row - data_.y) % spec_.tile_height;
-            const int last = std::min(first + spec_.tile_height, data_.y + data_.height);
+            const int first = row - (row - spec_.y) % spec_.tile_height;
+            const int last = std::min(first + spec_.tile_height, spec_.y + spec_.height);
             if (first != stripBegin_) {
                 strip_.resize(rowValues() * static_cast<std::size_t>(last - first));
                 stripBegin_ = std::numeric_limits<int>::min();
-                if (!input.read_tiles(0, 0, data_.x, data_.x + data_.width, first, last, 0, 1, begin_, end_,
-                                      OIIO::TypeDesc::FLOAT, strip_.data()))
+                if (!input.read_tiles(number_, 0, spec_.x, spec_.x + spec_.width, first, last, 0, 1, begin_,
+                                      end_, OIIO::TypeDesc::FLOAT, strip_.data()))
                     return false;
                 stripBegin_ = first;
             }
@@ -138,17 +126,85 @@ class FlatImages::Source {
         return true;
     }
 
-    std::string path_;
-    bool keepOpen_;
+    int number_;
     OIIO::ImageSpec spec_;
-    Window data_, display_;
-    std::unique_ptr<OIIO::ImageInput> input_;
-    std::vector<int> channels_;
     int begin_ = std::numeric_limits<int>::max();
     int end_ = 0;
     std::vector<float> values_;
     std::vector<float> strip_;
     int stripBegin_ = std::numeric_limits<int>::min();
+};
+
+class FlatImages::Source {
+  public:
+    Source(std::string path, bool keepOpen) : path_(std::move(path)), keepOpen_(keepOpen) {
+        auto input = vlx::open(path_);
+        for (int number = 0; input->seek_subimage(number, 0); ++number) {
+            const OIIO::ImageSpec spec = input->spec();
+            if (number > 0 && (spec.deep || dataWindow(spec) != dataWindow(parts_.front().spec()) ||
+                               spec.nchannels <= 0 || spec.depth > 1))
+                continue;
+            if (number > 0) checkRowLength(path_, spec);
+            const std::string name(spec.get_string_attribute("oiio:subimagename"));
+            for (int channel = 0; channel < spec.nchannels; ++channel) {
+                std::string known =
+                    partChannel(number, name, spec.channelnames[static_cast<std::size_t>(channel)]);
+                if (contains(names_, known)) continue;
+                names_.push_back(std::move(known));
+                places_.push_back({parts_.size(), channel});
+            }
+            parts_.emplace_back(number, spec);
+        }
+        static_cast<void>(input->geterror());  // there is no further part: not an error
+        input->seek_subimage(0, 0);
+        if (keepOpen_) input_ = std::move(input);
+    }
+
+    std::size_t take(const std::string& name) {
+        const auto found = std::find(names_.begin(), names_.end(), name);
+        if (found == names_.end())
+            throw Error(path_, "expected a channel " + name + ", found " + listed(names_));
+        taken_.push_back(places_[static_cast<std::size_t>(found - names_.begin())]);
+        parts_[taken_.back().part].take(taken_.back().channel);
+        return taken_.size() - 1;
+    }
+
+    void read(int y, int rows) {
+        if (taken_.empty()) return;
+        auto input = keepOpen_ ? std::move(input_) : vlx::open(path_);
+        for (FlatPart& part : parts_) {
+            if (!part.read(*input, y, rows))
+                throw Error(path_, "rows " + std::to_string(y) + " to " + std::to_string(y + rows - 1) +
+                                       ": " + reason(input->geterror()));
+            for (const float value : part.values())
+                hash_ = (hash_ ^ std::bit_cast<std::uint32_t>(value)) * 1099511628211u;
+        }
+        if (keepOpen_) input_ = std::move(input);
+    }
+
+    float value(std::size_t pixel, std::size_t index) const {
+        return parts_[taken_[index].part].value(pixel, taken_[index].channel);
+    }
+    const std::string& path() const { return path_; }
+    const OIIO::ImageSpec& spec() const { return parts_.front().spec(); }
+    const std::vector<std::string>& names() const { return names_; }
+    Window data() const { return dataWindow(spec()); }
+    Window display() const { return displayWindow(spec()); }
+    std::uint64_t hash() const { return hash_; }
+
+  private:
+    struct Place {
+        std::size_t part = 0;
+        int channel = 0;
+    };
+
+    std::string path_;
+    bool keepOpen_;
+    std::unique_ptr<OIIO::ImageInput> input_;
+    std::vector<FlatPart> parts_;
+    std::vector<std::string> names_;
+    std::vector<Place> places_;  // of each name
+    std::vector<Place> taken_;
     std::uint64_t hash_ = 14695981039346656037u;  // of all values read, FNV-1a
 };
 
@@ -169,10 +225,10 @@ FlatImages::~FlatImages() = default;
 std::size_t FlatImages::size() const { return sources_.size(); }
 const std::string& FlatImages::path(std::size_t image) const { return sources_[image]->path(); }
 const std::vector<std::string>& FlatImages::channels(std::size_t image) const {
-    return sources_[image]->spec().channelnames;
+    return sources_[image]->names();
 }
-const Window& FlatImages::data() const { return sources_.front()->data(); }
-const Window& FlatImages::display() const { return sources_.front()->display(); }
+Window FlatImages::data() const { return sources_.front()->data(); }
+Window FlatImages::display() const { return sources_.front()->display(); }
 
 std::string FlatImages::text(std::size_t image, const std::string& attribute) const {
     return std::string(sources_[image]->spec().get_string_attribute(attribute));

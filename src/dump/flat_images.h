@@ -17,6 +17,10 @@ std::string listed(const std::vector<std::string>& names);
 
 bool contains(const std::vector<std::string>& names, const std::string& name);
 
+/// What a channel of a file of several parts is called: as it is in the first part; with the part's name
+/// before it in others, unless it begins with it.
+std::string partChannel(int part, const std::string& partName, const std::string& channel);
+
 /// A channel of one of a set of images.
 struct FlatChannel {
     std::size_t image = 0;
@@ -33,9 +37,10 @@ class FlatImages {
 
     std::size_t size() const;
     const std::string& path(std::size_t image) const;
+    /// Of all flat parts with the first one's data window (partChannel).
     const std::vector<std::string>& channels(std::size_t image) const;
-    const Window& data() const;
-    const Window& display() const;
+    Window data() const;
+    Window display() const;
     /// Text attribute of an image, empty when it has none of this name.
     std::string text(std::size_t image, const std::string& attribute) const;
     /// Number attribute of an image.

@@ -1,5 +1,6 @@
 #include "variolux/dump/moments.h"
 
+#include <algorithm>
 #include <array>
 
 #include "channel_presets.h"
@@ -101,7 +102,10 @@ ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& 
                                                      : *c == 'G' ? "Y"
                                                                  : "Z");
     } else {
-        enter(map, "", findTriple(names, convention.colour));
+        const auto colour = findTriple(names, convention.colour);
+        if (preset == MomentPreset::Plain && !colour && cyclesLayer(names))
+            map = chooseStackMap("", names, {.preset = StackPreset::Cycles}).map;
+        enter(map, "", colour);
         enter(map, "variance", findTriple(names, convention.variance));
         enter(map, "albedo", findTriple(names, convention.albedo));
         enter(map, "N", findTriple(names, convention.normal));
@@ -112,18 +116,26 @@ ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& 
     return map;
 }
 
+// 0, 1, 2 for a channel of red, green, blue by its last letter; else -1.
+int colourOf(const std::string& channel) {
+    const std::size_t dot = channel.rfind('.');
+    if (dot == std::string::npos || dot + 2 != channel.size()) return -1;
+    const std::size_t found = std::string("RGBrgbXYZxyz").find(channel.back());
+    return found == std::string::npos ? -1 : static_cast<int>(found % 3);
+}
+
 bool isFeature(const std::string& channel) {
     return channel.size() > 1 ? !channel.starts_with("variance.") : channel == "A" || channel == "Z";
 }
 
 }  // namespace
 
-ImportReport importMoments(const std::string& image, const std::string& dump, const MomentOptions& options,
-                           const Progress& progress) {
+std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const MomentOptions& options) {
     std::vector<std::string> paths = {image};
     Companions companions(options.with);
     companions.appendTo(paths);
-    FlatImages images(paths);
+    auto opened = std::make_unique<FlatImages>(paths);
+    FlatImages& images = *opened;
     const Names& names = images.channels(0);
     const MomentPreset preset = options.preset == MomentPreset::Auto ? recognise(names) : options.preset;
     const Convention convention = conventionOf(preset);
@@ -137,10 +149,16 @@ ImportReport importMoments(const std::string& image, const std::string& dump, co
     }
     for (const char* channel : {"R", "G", "B"}) require(images, origins, channel, "say it with a mapping");
     for (const char* channel : {"variance.R", "variance.G", "variance.B"})
-        require(images, origins, channel, "a mapping or another image can hold the variance");
+        if (!origins.contains(channel))
+            throw Error(image,
+                        "expected the variance of each pixel (variance.R, .G, .B, or a renderer's own "
+                        "names), found " +
+                            listed(names) +
+                            ". Name its channels (--map variance.R=CHANNEL ...) or its image "
+                            "(--variance), or make a dump of images with several seeds (vlx-pack "
+                            "stack) or of two half-buffers (vlx-pack buffers)");
 
-    MomentSource source;
-    source.images = &images;
+    MomentChannels source;
     const auto meaning = options.meaning ? options.meaning : convention.meaning;
     if (!meaning)
         throw Error(image, "no renderer is known by these channels: say what its variance means, " +
@@ -173,8 +191,21 @@ ImportReport importMoments(const std::string& image, const std::string& dump, co
                         "without m2_; the image has " +
                             listed(names));
     }
+    for (const auto& wanted : options.radiance) {
+        const Names parts = radianceChannels(names, wanted);
+        if (parts.empty())
+            throw Error(image,
+                        "expected a channel or layer of radiance " + wanted + ", found " + listed(names));
+        for (const auto& part : parts) {
+            if (!origins.try_emplace(part, Origin{0, part}).second)
+                throw Error(image, part + " is taken already and cannot be named as radiance");
+            source.radiance.push_back({part, images.take(0, part), colourOf(part)});
+        }
+    }
     for (const auto& [channel, origin] : origins)
-        if (isFeature(channel))
+        if (isFeature(channel) &&
+            std::none_of(source.radiance.begin(), source.radiance.end(),
+                         [&name = channel](const auto& part) { return part.name == name; }))
             source.features.emplace_back(channel, images.take(origin.image, origin.channel));
 
     ImportReport report;
@@ -188,11 +219,17 @@ ImportReport importMoments(const std::string& image, const std::string& dump, co
             "small or too large.");
     if (preset == MomentPreset::Arnold)
         report.notes.push_back("Arnold's samples a pixel are the square of its AA samples.");
-    writeMoments(source,
-                 {dump, options.renderer.empty() ? images.text(0, "Software") : options.renderer,
-                  options.halves, options.seed, options.compression},
-                 report, progress);
-    return report;
+    const std::string renderer = options.renderer.empty() ? images.text(0, "Software") : options.renderer;
+    return std::make_unique<MomentRows>(
+        std::move(opened), std::move(source),
+        MomentOutput{renderer, options.halves, options.seed, options.compression}, std::move(report));
+}
+
+ImportReport importMoments(const std::string& image, const std::string& dump, const MomentOptions& options,
+                           const Progress& progress) {
+    const auto samples = openMoments(image, options);
+    writeSamples(*samples, dump, progress);
+    return samples->report();
 }
 
 }  // namespace vlx

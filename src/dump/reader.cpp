@@ -13,6 +13,7 @@
 #include "little_endian.h"
 #include "pool.h"
 #include "raw_file.h"
+#include "stored_values.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/splats.h"
@@ -97,14 +98,6 @@ struct DumpReader::Impl {
     [[noreturn]] void damaged(int y, const std::string& reason) const {
         throw Error(file.name(), "scanline " + std::to_string(y) + " (chunk " +
                                      std::to_string(std::int64_t{y} - header.dump.data.y) + "): " + reason);
-    }
-
-    void checkRows(int y, int rows) const {
-        const Window& window = header.dump.data;
-        if (rows < 1 || y < window.y || std::int64_t{y} + rows > std::int64_t{window.y} + window.height)
-            throw Error(file.name(), "expected rows within " + windowText(window) + ", found rows " +
-                                         std::to_string(y) + " to " +
-                                         std::to_string(std::int64_t{y} + rows - 1));
     }
 
     std::span<const unsigned char> read(std::uint64_t position, std::uint64_t count, Scratch& scratch) const {
@@ -228,7 +221,7 @@ struct DumpReader::Impl {
     }
 
     std::vector<Chunk> readCounts(int y, int rows) const {
-        checkRows(y, rows);
+        checkRows(file.name(), header.dump, y, rows);
         const auto first = static_cast<std::uint64_t>(std::int64_t{y} - header.dump.data.y);
         Bytes table(8 * static_cast<std::size_t>(rows));
         file.readAt(header.chunkTable + 8 * first, table);

@@ -19,6 +19,7 @@
 #include "little_endian.h"
 #include "pool.h"
 #include "raw_file.h"
+#include "stored_values.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
@@ -55,13 +56,6 @@ class CpuTimer {
     std::atomic<std::int64_t>& sum_;
     const std::int64_t start_ = threadNanoseconds();
 };
-
-// Negative and NaN become 0, what is too large the largest value.
-std::uint32_t toUint(float value) {
-    if (!(value > 0.0f)) return 0;
-    if (value >= 4294967296.0f) return std::numeric_limits<std::uint32_t>::max();
-    return static_cast<std::uint32_t>(std::lround(static_cast<double>(value)));
-}
 
 void appendValues(Bytes& bytes, ChannelType type, const float* values, std::size_t count) {
     bytes.resize(bytes.size() + count * valueBytes(type));

@@ -14,7 +14,7 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
 }
 
 /// The channels of some rows; one sample for each replicate where its samples have light in common.
-SampleBand readBand(const DumpReader& reader, const ChannelChoice& channels, int y, int rows) {
+SampleBand readBand(const SampleSource& reader, const ChannelChoice& channels, int y, int rows) {
     const DumpHeader& header = reader.header();
     if (!header.replicatesShare || findChannel(header, "sample.replicate") < 0)
         return reader.read(y, rows, channels.names);
@@ -53,7 +53,7 @@ Image makeOutputImage(const DumpHeader& header, const ChannelChoice& channels) {
     return image;
 }
 
-void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step,
+void forEachBand(const SampleSource& reader, const ChannelChoice& channels, int step,
                  ReconstructionReport& report, const Progress& progress,
                  const std::function<void(const SampleBand&)>& body) {
     const Window& window = reader.header().data;

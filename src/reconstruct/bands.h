@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "variolux/base/progress.h"
-#include "variolux/dump/reader.h"
+#include "variolux/dump/sample_source.h"
 #include "variolux/reconstruct/reconstruction.h"
 #include "variolux/reconstruct/region.h"
 
@@ -30,7 +30,7 @@ int nextMultiple(int a, int step);
 /// Reads the dump in bands of rows that start at multiples of `step` in raster coordinates (the first and the
 /// last may be shorter), step rows or a few times that, or all at once where step is 0, and calls body(band).
 /// Adds what reading took to report.readSeconds and the samples to report.samples.
-void forEachBand(const DumpReader& reader, const ChannelChoice& channels, int step,
+void forEachBand(const SampleSource& reader, const ChannelChoice& channels, int step,
                  ReconstructionReport& report, const Progress& progress,
                  const std::function<void(const SampleBand&)>& body);
 

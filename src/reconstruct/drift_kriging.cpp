@@ -55,6 +55,13 @@ Window scaled(const Window& window, int scale) {
     return {window.x * scale, window.y * scale, window.width * scale, window.height * scale};
 }
 
+/// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
+double coverage(double alpha) {
+    constexpr double kRounding = 1e-5;
+    if (alpha < kRounding) return 0;
+    return alpha > 1 - kRounding ? 1 : alpha;
+}
+
 class Stopwatch {
   public:
     /// Adds the time since the last call (or construction) to `seconds`.
@@ -72,7 +79,7 @@ class Stopwatch {
 /// needs.
 class Pipeline {
   public:
-    Pipeline(const DumpReader& dump, const DriftKrigingOptions& options, const RowSink& sink,
+    Pipeline(const SampleSource& dump, const DriftKrigingOptions& options, const RowSink& sink,
              const Progress& progress)
         : dump_(dump),
           options_(options),
@@ -624,7 +631,10 @@ class Pipeline {
             for (int j = 1; j <= m; ++j) value += weights[j - 1] * both(j);
             const double strength = n > 0 ? options_.strength : 1;
             // Light is not negative. Parts of light must add up: they are left as they come.
-            if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0) value = std::max(0.0, value);
+            if (c == layout_.alpha)
+                value = coverage(value);
+            else if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0)
+                value = std::max(0.0, value);
             const double chosen = known ? mean : value;
             out[c] = static_cast<float>(mean + strength * (chosen - mean));
             if (c >= 3) continue;
@@ -664,7 +674,7 @@ class Pipeline {
         return sum / count;
     }
 
-    const DumpReader& dump_;
+    const SampleSource& dump_;
     const DriftKrigingOptions& options_;
     const RowSink& sink_;
     const Progress& progress_;
@@ -701,7 +711,7 @@ std::optional<std::string> DriftKrigingOptions::validate() const {
     return std::nullopt;
 }
 
-Image driftKrigingOutline(const DumpReader& dump, const DriftKrigingOptions& options) {
+Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& options) {
     Image image;
     image.data = bandOf(scaled(dump.header().data, options.scale), options.band);
     if (image.data.height == 0)
@@ -711,18 +721,19 @@ Image driftKrigingOutline(const DumpReader& dump, const DriftKrigingOptions& opt
     image.display = scaled(dump.header().display, options.scale);
     image.channels = {"R", "G", "B"};
     if (findChannel(dump.header(), "A") >= 0) image.channels.emplace_back("A");
-    image.channels.insert(image.channels.end(), options.radiance.begin(), options.radiance.end());
+    const std::vector<std::string> further = furtherRadiance(dump.header(), options);
+    image.channels.insert(image.channels.end(), further.begin(), further.end());
     for (const char* name : {"stddev.R", "stddev.G", "stddev.B"}) image.channels.emplace_back(name);
     return image;
 }
 
-ReconstructionReport reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
+ReconstructionReport reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
                                              const RowSink& sink, const Progress& progress) {
     if (const auto broken = options.validate()) throw Error("", *broken);
     return Pipeline(dump, options, sink, progress).run();
 }
 
-Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
+Reconstruction reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
                                        const Progress& progress) {
     if (const auto broken = options.validate()) throw Error("", *broken);
     const Image outline = driftKrigingOutline(dump, options);

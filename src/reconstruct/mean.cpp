@@ -31,7 +31,7 @@ Eigen::VectorXd borrowedVariance(const SampleBand& band, const BandLayout& layou
 
 }  // namespace
 
-Reconstruction reconstructMean(const DumpReader& dump, const Progress& progress) {
+Reconstruction reconstructMean(const SampleSource& dump, const Progress& progress) {
     ChannelChoice channels = chooseChannels(dump.header());
     channels.names.resize(channels.layout.radiance.size());  // positions are not needed
     channels.layout.x = channels.layout.y = -1;

@@ -312,7 +312,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, 
     return estimate;
 }
 
-Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& options,
+Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& options,
                                 const Progress& progress) {
     if (const auto broken = options.validate()) throw Error("", *broken);
     const DumpHeader& header = dump.header();

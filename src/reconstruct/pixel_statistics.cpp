@@ -5,6 +5,7 @@
 
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
+#include "variolux/dump/import.h"
 
 namespace vlx {
 
@@ -25,20 +26,30 @@ void addFeatures(const DumpHeader& header, const std::vector<std::string>& chann
     ++layout.groups;
 }
 
-void requireChannel(const DumpReader& dump, const SampleLayout& layout, const std::string& channel) {
+void requireChannel(const SampleSource& dump, const SampleLayout& layout, const std::string& channel) {
     if (findChannel(dump.header(), channel) < 0)
         throw Error(dump.path(), "expected a channel '" + channel + "', found none of that name");
     if (std::find(layout.names.begin(), layout.names.end(), channel) != layout.names.end())
         throw Error(dump.path(), "channel '" + channel + "' is used already and cannot be named again");
 }
 
+/// Whether the radiance of a sample is finite, its channels those from `first` on; alpha is none.
+bool usable(const SampleBand& band, const SampleLayout& layout, std::size_t first, std::size_t sample) {
+    for (int c = 0; c < layout.radiance; ++c)
+        if (c != layout.alpha && !std::isfinite(band.values[first + static_cast<std::size_t>(c)][sample]))
+            return false;
+    return true;
+}
+
 /// 99th percentiles of the magnitudes of features `first` and on, over rows spread evenly.
-void measureScales(const DumpReader& dump, SampleLayout& layout, std::size_t first) {
+void measureScales(const SampleSource& dump, SampleLayout& layout, std::size_t first) {
     const std::size_t measured = layout.scale.size() - first;
     if (measured == 0) return;
-    const std::vector<std::string> channels(
+    std::vector<std::string> channels(
         layout.names.begin() + layout.radiance + static_cast<std::ptrdiff_t>(first),
         layout.names.begin() + layout.radiance + layout.features);
+    // Radiance too: samples that are dropped say nothing about features either.
+    channels.insert(channels.end(), layout.names.begin(), layout.names.begin() + layout.radiance);
     std::vector<std::vector<float>> magnitudes(measured);
     const Window& window = dump.header().data;
     const int rows = std::min(kScaleRows, window.height);
@@ -46,9 +57,12 @@ void measureScales(const DumpReader& dump, SampleLayout& layout, std::size_t fir
         const auto row =
             static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(window.height) / (2 * rows));
         const SampleBand band = dump.read(window.y + row, 1, channels);
-        for (std::size_t c = 0; c < measured; ++c)
-            for (const float value : band.values[c])
-                if (std::isfinite(value)) magnitudes[c].push_back(std::abs(value));
+        for (std::size_t s = 0; s < band.samples(); ++s) {
+            if (!usable(band, layout, measured, s)) continue;
+            for (std::size_t c = 0; c < measured; ++c)
+                if (const float value = band.values[c][s]; std::isfinite(value))
+                    magnitudes[c].push_back(std::abs(value));
+        }
     }
     for (std::size_t c = 0; c < measured; ++c) {
         std::vector<float>& values = magnitudes[c];
@@ -89,7 +103,18 @@ double knownSquares(const SampleBand& band, const SampleLayout& layout,
 
 }  // namespace
 
-SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOptions& options) {
+std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options) {
+    std::vector<std::string> names, further;
+    for (const DumpChannel& channel : header.channels) names.push_back(channel.name);
+    for (const std::string& wanted : options.radiance) {
+        const std::vector<std::string> channels = radianceChannels(names, wanted);
+        if (channels.empty()) further.push_back(wanted);  // chooseSampleLayout() says what is wrong
+        further.insert(further.end(), channels.begin(), channels.end());
+    }
+    return further;
+}
+
+SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOptions& options) {
     const DumpHeader& header = dump.header();
     SampleLayout layout;
     layout.names = {"R", "G", "B"};
@@ -97,7 +122,7 @@ SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOption
         layout.alpha = static_cast<int>(layout.names.size());
         layout.names.emplace_back("A");
     }
-    for (const std::string& channel : options.radiance) {
+    for (const std::string& channel : furtherRadiance(header, options)) {
         requireChannel(dump, layout, channel);
         layout.names.push_back(channel);
     }
@@ -162,42 +187,41 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
     const auto features = static_cast<std::size_t>(layout.features);
     std::vector<double> first(radiance + features), sum[2], square(radiance + features);
     const std::size_t alpha = layout.alpha < 0 ? radiance + features : static_cast<std::size_t>(layout.alpha);
-    std::vector<std::size_t> usable, halves[2];
+    std::vector<std::size_t> taken, halves[2];
     std::vector<std::pair<std::uint64_t, std::size_t>> order;
     for (int x = 0; x < band.width; ++x) {
         const std::size_t pixel = static_cast<std::size_t>(bandRow) * static_cast<std::size_t>(band.width) +
                                   static_cast<std::size_t>(x);
-        usable.clear();
+        taken.clear();
         for (std::size_t s = band.offsets[pixel]; s < band.offsets[pixel + 1]; ++s) {
             ++counts.samples;
-            if (std::isfinite(band.values[0][s]) && std::isfinite(band.values[1][s]) &&
-                std::isfinite(band.values[2][s]))
-                usable.push_back(s);
+            if (usable(band, layout, 0, s))
+                taken.push_back(s);
             else
                 ++counts.dropped;
         }
         halves[0].clear();
         halves[1].clear();
         if (layout.replicate >= 0)
-            for (const std::size_t s : usable)
+            for (const std::size_t s : taken)
                 halves[static_cast<std::uint32_t>(
                            band.values[static_cast<std::size_t>(layout.replicate)][s]) %
                        2]
                     .push_back(s);
         if (halves[0].empty() || halves[1].empty()) {  // no replicates, or only one
             order.clear();
-            for (std::size_t i = 0; i < usable.size(); ++i)
-                order.emplace_back(hashOf(x, y, static_cast<std::int64_t>(i)), usable[i]);
+            for (std::size_t i = 0; i < taken.size(); ++i)
+                order.emplace_back(hashOf(x, y, static_cast<std::int64_t>(i)), taken[i]);
             std::sort(order.begin(), order.end());
             halves[0].clear();
             halves[1].clear();
             // Single samples go to the halves by turns, as the fields of a chessboard do.
-            const std::size_t startHalf = usable.size() == 1 ? static_cast<std::size_t>(x + y) % 2 : 0;
+            const std::size_t startHalf = taken.size() == 1 ? static_cast<std::size_t>(x + y) % 2 : 0;
             for (std::size_t i = 0; i < order.size(); ++i)
                 halves[(startHalf + i) % 2].push_back(order[i].second);
         }
-        const auto n = static_cast<double>(usable.size());
-        if (usable.empty()) ++counts.empty;
+        const auto n = static_cast<double>(taken.size());
+        if (taken.empty()) ++counts.empty;
 
         std::fill(square.begin(), square.end(), 0.0);
         for (auto& s : sum) s.assign(radiance + features, 0.0);
@@ -210,7 +234,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
             return std::isfinite(v) ? v : 0.0;
         };
         for (std::size_t c = 0; c < radiance + features; ++c)
-            first[c] = usable.empty() ? 0 : value(c, usable[0]);
+            first[c] = taken.empty() ? 0 : value(c, taken[0]);
         for (int half = 0; half < 2; ++half)
             for (const std::size_t s : halves[half]) {
                 for (std::size_t c = 0; c < 3; ++c) rgb[c] = value(c, s);
@@ -235,7 +259,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
                 }
             }
 
-        const bool known = varianceKnown(band, layout, usable);
+        const bool known = varianceKnown(band, layout, taken);
         const auto put = [&](int plane, double v) { ring.row(plane, y)[x] = static_cast<float>(v); };
         const auto nA = static_cast<double>(halves[0].size());
         const auto nB = static_cast<double>(halves[1].size());
@@ -251,7 +275,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         for (std::size_t c = 0; c < radiance + features; ++c) {
             const double total = sum[0][c] + sum[1][c];
             double squares = n > 0 ? std::max(0.0, square[c] - total * total / n) : 0;
-            if (c < 3 && known) squares = knownSquares(band, layout, usable, c);
+            if (c < 3 && known) squares = knownSquares(band, layout, taken, c);
             if (c < 3) put(planes.squares + static_cast<int>(c), squares);
             if (c < radiance) continue;
             const double scale = layout.scale[c - radiance];
@@ -260,7 +284,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
             put(planes.featureError + f, n > 1 ? squares / (n * (n - 1)) / (scale * scale) : 0);
         }
         for (std::size_t c = 0; c < radiance; ++c)
-            put(planes.brightest + static_cast<int>(c), usable.empty() ? 0 : value(c, bright));
+            put(planes.brightest + static_cast<int>(c), taken.empty() ? 0 : value(c, bright));
         put(planes.brightestLuminance, std::max(0.f, most));
         put(planes.secondLuminance, std::max(0.f, second));
         put(planes.brightestHalf, brightHalf);

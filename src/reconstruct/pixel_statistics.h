@@ -7,7 +7,7 @@
 #include "row_ring.h"
 #include "variolux/dump/band.h"
 #include "variolux/dump/format.h"
-#include "variolux/dump/reader.h"
+#include "variolux/dump/sample_source.h"
 #include "variolux/reconstruct/drift_kriging.h"
 
 /// What the default method knows of a pixel: moments of its samples, gathered in one pass over the dump.
@@ -27,11 +27,14 @@ struct SampleLayout {
     int variance = -1;   ///< index in `names` of the first of kVarianceChannels, all three of which are there
 };
 
+/// The channels that options.radiance stands for.
+std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options);
+
 /// Finds the roles. Albedo and normals are of order 1 by definition; the scale of depth and of named features
 /// is the 99th percentile of their magnitude in 16 rows spread over the image (the same rows whatever band of
 /// the image is reconstructed). Features that are constant in these rows stay: they cost little. Throws Error
 /// when a named channel is missing or is R, G or B.
-SampleLayout chooseSampleLayout(const DumpReader& dump, const DriftKrigingOptions& options);
+SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOptions& options);
 
 /// Planes of the statistics of rows of pixels, as gathered.
 struct GatheredPlanes {
@@ -62,7 +65,7 @@ struct GatherCounts {
 /// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
 /// alike, and may lie on different sides of the pixel. A single sample belongs to A or B as its pixel is a
 /// black or a white field of a chessboard. Samples with known error variances (kVarianceChannels) stand for
-/// their own scatter. A sample with a non-finite R, G or B is dropped; other non-finite values count as 0.
+/// their own scatter. A sample with radiance that is not finite is dropped; other such values count as 0.
 /// Sums run in double precision about the pixel's first sample. A `clamp` above 0 limits the luminance of
 /// each sample.
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,

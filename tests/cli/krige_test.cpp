@@ -200,5 +200,134 @@ TEST(VlxKrige, NonFiniteSamplesAreDroppedAndCounted) {
     for (const float value : readImage(folder / "out.exr").pixels) EXPECT_TRUE(std::isfinite(value));
 }
 
+// A flat image of means and variances with light groups, in the picture of an edge.
+constexpr Window kFlatWindow{2, -1, 40, 37};
+
+void writeFlat(const std::string& path, const std::vector<std::string>& more = {}, float bad = 1) {
+    std::vector<std::string> channels = {"R", "G", "B", "A", "mse.R", "mse.G", "mse.B"};
+    channels.insert(channels.end(), {"key.R", "key.G", "key.B", "fill.R", "fill.G", "fill.B"});
+    channels.insert(channels.end(), more.begin(), more.end());
+    Image image(kFlatWindow, channels);
+    image.display = {0, 0, 50, 50};
+    for (int row = 0; row < kFlatWindow.height; ++row)
+        for (int col = 0; col < kFlatWindow.width; ++col) {
+            float* pixel = image.at(col, row);
+            for (int c = 0; c < image.channelCount(); ++c) {
+                const float noise =
+                    0.01f *
+                    static_cast<float>((7 * col + 13 * row * row + 5 * (c < 7 ? c % 3 : (c - 7) % 3)) % 11);
+                const float radiance = (col + row > 40 ? 2.f : 0.5f) + noise;
+                pixel[c] = c < 3 ? radiance : c < 7 ? (c == 3 ? 1.f : 1e-3f) : radiance / 2;
+            }
+        }
+    image.at(20, 20)[1] *= bad;
+    writeImage(path, image);
+}
+
+TEST(VlxKrigeFlat, EqualsPackingAndKrigingAndKeepsTheOtherLayers) {
+    const TemporaryFolder folder;
+    writeFlat(folder / "in.exr", {"mask", "N.X", "N.Y", "N.Z"});
+    const ToolRun run = krige({folder / "in.exr", "-o", folder / "out.exr", "--preset", "renderman",
+                               "--radiance", "key", "--radiance", "fill"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    ASSERT_EQ(runTool("vlx-pack", {"moments", folder / "in.exr", "-o", folder / "dump.exr", "--radiance",
+                                   "key", "--radiance", "fill"})
+                  .exitCode,
+              0);
+    ASSERT_EQ(
+        krige({folder / "dump.exr", "-o", folder / "two.exr", "--radiance", "key", "--radiance", "fill"})
+            .exitCode,
+        0);
+    const Image in = readImage(folder / "in.exr"), out = readImage(folder / "out.exr"),
+                two = readImage(folder / "two.exr");
+    EXPECT_EQ(out.data, kFlatWindow);
+    EXPECT_EQ(out.display, in.display);
+    EXPECT_EQ(out.channelCount(), in.channelCount() + 3);
+    for (int i = 0; i < kFlatWindow.width * kFlatWindow.height; ++i) {
+        const float *was = in.at(i % 40, i / 40), *is = out.at(i % 40, i / 40),
+                    *same = two.at(i % 40, i / 40);
+        for (const std::string& name : out.channels) {
+            const int denoised = two.channel(name);
+            ASSERT_EQ(is[out.channel(name)], denoised >= 0 ? same[denoised] : was[in.channel(name)]) << name;
+        }
+        for (const char* c : {"R", "G", "B"}) {
+            const std::string colour = c;
+            ASSERT_NEAR(is[out.channel("key." + colour)] + is[out.channel("fill." + colour)],
+                        is[out.channel(colour)], 4e-6);
+        }
+        ASSERT_EQ(is[out.channel("A")], 1);
+    }
+    EXPECT_NE(run.err.find("stddev.R added"), std::string::npos) << run.err;
+
+    ASSERT_EQ(krige({folder / "in.exr", "-o", folder / "bare.exr", "--drop-layers", "-q"}).exitCode, 0);
+    EXPECT_EQ(readImage(folder / "bare.exr").channels.size(), 7u);
+}
+
+TEST(VlxKrigeFlat, ANonFinitePixelIsPredictedAndCounted) {
+    const TemporaryFolder folder;
+    writeFlat(folder / "in.exr", {}, std::nanf(""));
+    const ToolRun run = krige({folder / "in.exr", "-o", folder / "out.exr", "--json"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const auto report = nlohmann::json::parse(run.out);
+    EXPECT_EQ(report["droppedSamples"], 1);
+    EXPECT_EQ(report["emptyPixels"], 1);
+    const Image image = readImage(folder / "out.exr");
+    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+    EXPECT_NEAR(image.at(20, 20)[image.channel("G")], 0.55, 0.1);
+}
+
+TEST(VlxKrigeFlat, ResultsGoIntoACopyOfATemplate) {
+    const TemporaryFolder folder;
+    writeFlat(folder / "in.exr");
+    Image beauty(kFlatWindow,
+                 {"V.Combined.R", "V.Combined.G", "V.Combined.B", "V.Combined.A", "V.Id.X", "key.G"});
+    beauty.display = {0, 0, 60, 60};
+    for (std::size_t i = 0; i < beauty.pixels.size(); ++i) beauty.pixels[i] = static_cast<float>(i % 13);
+    ImageWriteOptions half;
+    half.half = true;
+    writeImage(folder / "beauty.exr", beauty, half);
+    ASSERT_EQ(
+        runTool("vlx-pack", {"moments", folder / "in.exr", "-o", folder / "dump.exr", "--radiance", "key"})
+            .exitCode,
+        0);
+    const ToolRun run = krige({folder / "dump.exr", "-o", folder / "out.exr", "--template",
+                               folder / "beauty.exr", "--radiance", "key.G"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    ASSERT_EQ(krige({folder / "dump.exr", "-o", folder / "plain.exr", "--radiance", "key.G"}).exitCode, 0);
+    const Image out = readImage(folder / "out.exr"), plain = readImage(folder / "plain.exr");
+    EXPECT_EQ(out.display, beauty.display);
+    EXPECT_EQ(out.channelCount(), 9);
+    for (int row = 0; row < 37; ++row)
+        for (int col = 0; col < 40; ++col) {
+            const float *is = out.at(col, row), *result = plain.at(col, row);
+            ASSERT_EQ(is[out.channel("V.Id.X")], beauty.at(col, row)[4]);
+            ASSERT_EQ(is[out.channel("stddev.B")], result[plain.channel("stddev.B")]);
+            for (const auto& [layer, channel] : {std::pair{"V.Combined.B", "B"}, {"key.G", "key.G"}})
+                ASSERT_NEAR(is[out.channel(layer)], result[plain.channel(channel)], 2e-3);
+        }
+}
+
+TEST(VlxKrigeFlat, WhatDoesNotFitIsTold) {
+    const TemporaryFolder folder;
+    writeFlat(folder / "in.exr");
+    Image other({0, 0, 8, 8}, {"R", "G", "B"});
+    writeImage(folder / "other.exr", other);
+    const auto fails = [&](std::vector<std::string> arguments, int code, const std::string& text) {
+        arguments.insert(arguments.end(), {"-o", folder / "out.exr"});
+        const ToolRun run = krige(arguments);
+        EXPECT_EQ(run.exitCode, code) << run.err;
+        EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
+        EXPECT_FALSE(std::filesystem::exists(folder / "out.exr"));
+    };
+    fails({folder / "other.exr"}, 1, "other.exr: expected the variance of each pixel");
+    fails({folder / "in.exr", "--template", folder / "other.exr"}, 1,
+          "other.exr: expected the image's data window");
+    fails({folder / "in.exr", "--template", kDump}, 1, "expected a flat image");
+    fails({folder / "in.exr", "--band", "1/2"}, 2, "--band, --scale and --max-memory go with --drop-layers");
+    fails({folder / "in.exr", "--radiance", "rim"}, 1, "layer of radiance rim");
+    fails({kDump, "--variance", folder / "in.exr"}, 2, "--variance goes with a flat image");
+    fails({kDump, "--drop-layers"}, 2, "--drop-layers goes with a flat image");
+}
+
 }  // namespace
 }  // namespace vlx

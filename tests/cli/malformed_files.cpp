@@ -6,6 +6,7 @@
 #include <functional>
 #include <utility>
 
+#include "../dump/layer_files.h"
 #include "../dump/renderer_files.h"
 #include "../dump/test_dumps.h"
 #include "../render/gltf_text.h"
@@ -154,6 +155,24 @@ void addImages(Collection& all, const TemporaryFolder& folder) {
         for (std::size_t i = b.size() - 60; i < b.size(); ++i) b[i] = static_cast<unsigned char>(i * 37);
     });
     with("that is a dump", [&](Bytes& b) { b = smallDump(folder); });
+    // Several parts: the lies are in the second, whose attributes are the last.
+    std::vector<LayerPart> parts = rendererParts();
+    parts.pop_back();
+    writeLayers(folder / "parts.exr", parts);
+    const Bytes several = fileBytes(folder / "parts.exr");
+    all.truncations(Image, "image of parts, the first of which is", {several.begin(), several.begin() + 6000},
+                    3);
+    const auto parted = [&](const std::string& name, const std::function<void(Bytes&)>& change) {
+        Bytes bytes = several;
+        change(bytes);
+        all.add(Image, "image of parts " + name, std::move(bytes));
+    };
+    parted("whose second window is huge",
+           [](Bytes& b) { put(b, attribute(b, "dataWindow", "box2i") + 8, 2147483647); });
+    parted("whose second tiles are empty",
+           [](Bytes& b) { put(b, attribute(b, "tiles", "tiledesc"), std::int32_t{0}); });
+    parted("whose second list of channels is cut",
+           [](Bytes& b) { put(b, attribute(b, "channels", "chlist") - 4, std::int32_t{5}); });
     all.add(Image, "image that is text", {'s', 'o', 'm', 'e', ' ', 't', 'e', 'x', 't', '\n'});
     all.add(Image, "image that is a PNG's start", {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13});
 }

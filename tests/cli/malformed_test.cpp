@@ -28,7 +28,8 @@ std::vector<Command> commandsFor(MalformedKind kind, const std::string& out) {
         case MalformedKind::Image:
             return {{"vlx-pack", {"stack"}, {"-o", out}},
                     {"vlx-pack", {"moments"}, {"-o", out, "--preset", "plain", "--variance-is", "mean"}},
-                    {"vlx-pack", {"merge"}, {"-o", out, "--crop"}}};
+                    {"vlx-pack", {"merge"}, {"-o", out, "--crop"}},
+                    {"vlx-krige", {}, {"-o", out, "--map", "Z=R"}}};
         case MalformedKind::BcdRaw:
             return {{"vlx-pack", {"bcd"}, {"-o", out}}};
         case MalformedKind::Sbmc:
@@ -68,7 +69,9 @@ TEST_P(Malformed, FilesEndInAMessage) {
         std::vector<Command> commands = {all[turn++ % all.size()]};
         if (std::getenv("VLX_ALL_TOOLS") != nullptr) commands = all;
         for (const Command& command : commands) {
-            if (file.name == "image that is a dump" && command.before.front() == "merge") continue;  // fine
+            if (file.name == "image that is a dump" && command.before != std::vector<std::string>{"stack"} &&
+                command.before != std::vector<std::string>{"moments"})
+                continue;  // fine, or bad usage
             std::vector<std::string> arguments = command.before;
             arguments.push_back(path);
             arguments.insert(arguments.end(), command.after.begin(), command.after.end());

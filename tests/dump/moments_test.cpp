@@ -266,7 +266,7 @@ TEST(ImportMoments, WhatCannotBeFoundIsAnErrorWithTheChannels) {
         return errorOf([&] { importMoments(folder / "i.exr", folder / "d.exr", options); });
     };
     const Image plain = imageOf(kWindow, {"R", "G", "B"}, meanOf);
-    EXPECT_NE(outcome(plain, {}).find("found nothing to take as variance.R"), std::string::npos);
+    EXPECT_NE(outcome(plain, {}).find("expected the variance of each pixel"), std::string::npos);
     EXPECT_NE(outcome(withVariance("var"), {}).find("say what its variance means"), std::string::npos);
     MomentOptions options;
     options.map["R"] = "nonsense";
@@ -357,6 +357,81 @@ TEST(ImportMoments, InfoSeesTheVariance) {
     importMoments(folder / "i.exr", folder / "d.exr", options);
     for (const MissingPart& part : inspectDump(folder / "d.exr").missing)
         EXPECT_EQ(part.what.find("second sample"), std::string::npos);
+}
+
+// Without the dump between: the same samples, rows in any order, halves rounded as a file would.
+TEST(OpenMoments, GivesWhatTheDumpHolds) {
+    const TemporaryFolder folder;
+    writeImage(folder / "in.exr", imageOf(kWindow,
+                                          {"R", "G", "B", "mse.R", "mse.G", "mse.B", "A", "albedo.R",
+                                           "albedo.G", "albedo.B", "key.R", "key.G", "key.B", "id"},
+                                          [](int c, int x, int y) {
+                                              if (c == 0 && x == 4 && y == 9) return NAN;
+                                              return c < 3   ? meanOf(c, x, y)
+                                                     : c < 6 ? varianceOf(c - 3, x, y)
+                                                             : 0.1f * static_cast<float>(c) +
+                                                                   0.001f * static_cast<float>(x * y);
+                                          }));
+    for (const bool halves : {true, false}) {
+        MomentOptions options;
+        options.halves = halves;
+        options.radiance = {"key", "id"};
+        importMoments(folder / "in.exr", folder / "d.exr", options);
+        const DumpReader dump(folder / "d.exr");
+        const auto samples = openMoments(folder / "in.exr", options);
+        std::vector<std::string> names;
+        for (const auto& channel : dump.header().channels) names.push_back(channel.name);
+        EXPECT_EQ(samples->header().channels.size(), names.size());
+        EXPECT_EQ(samples->header().display, dump.header().display);
+        for (const auto& [y, rows] : {std::pair{20, 16}, {-1, 37}, {5, 1}})
+            expectSame(dump.read(y, rows, names), samples->read(y, rows, names));
+        const SampleBand pixel = samples->read(9, 1, {"R"});
+        EXPECT_EQ(pixel.offsets[3] - pixel.offsets[2], 1u);  // not two halves of nothing
+        EXPECT_NE(errorOf([&] { samples->read(30, 7); }).find("expected rows within"), std::string::npos);
+        EXPECT_NE(errorOf([&] { samples->read(0, 1, {"Q"}); }).find("expected a channel Q"),
+                  std::string::npos);
+    }
+}
+
+// Parts of R, G and B have no variance of their own; their halves must add up to those of the whole.
+TEST(OpenMoments, PartsOfTheLightAddUpInEachHalf) {
+    const TemporaryFolder folder;
+    writeImage(folder / "in.exr", imageOf(kWindow,
+                                          {"R", "G", "B", "mse.R", "mse.G", "mse.B", "key.R", "key.G",
+                                           "key.B", "fill.R", "fill.G", "fill.B"},
+                                          [](int c, int x, int y) {
+                                              if (c < 3) return meanOf(c, x, y);
+                                              if (c < 6) return varianceOf(c - 3, x, y);
+                                              const float key =
+                                                  0.25f * static_cast<float>((x + 3 * y + 64) % 4);
+                                              return (c < 9 ? key : 1 - key) * meanOf(c % 3, x, y);
+                                          }));
+    MomentOptions options;
+    options.radiance = {"key", "fill"};
+    const SampleBand band =
+        openMoments(folder / "in.exr", options)
+            ->read(kWindow.y, kWindow.height,
+                   {"R", "G", "B", "key.R", "key.G", "key.B", "fill.R", "fill.G", "fill.B"});
+    ASSERT_EQ(band.samples(), 2 * band.pixels());
+    for (std::size_t c = 0; c < 3; ++c)
+        for (std::size_t i = 0; i < band.samples(); ++i)
+            ASSERT_NEAR(band.values[3 + c][i] + band.values[6 + c][i], band.values[c][i], 1e-6);
+    options.radiance = {"rim"};
+    EXPECT_NE(
+        errorOf([&] { openMoments(folder / "in.exr", options); }).find("layer of radiance rim, found R, G"),
+        std::string::npos);
+    options.radiance = {"R"};
+    EXPECT_NE(errorOf([&] { openMoments(folder / "in.exr", options); }).find("R is taken already"),
+              std::string::npos);
+}
+
+TEST(OpenMoments, WithoutAVarianceSaysWhatIsMissing) {
+    const TemporaryFolder folder;
+    writeImage(folder / "in.exr", imageOf(kWindow, {"R", "G", "B"}, meanOf));
+    const std::string text = errorOf([&] { openMoments(folder / "in.exr", {}); });
+    EXPECT_NE(text.find("in.exr: expected the variance of each pixel"), std::string::npos) << text;
+    for (const char* remedy : {"--variance", "vlx-pack stack", "vlx-pack buffers"})
+        EXPECT_NE(text.find(remedy), std::string::npos) << text;
 }
 
 }  // namespace

@@ -189,5 +189,28 @@ TEST(Stack, ADumpIsNotAnImage) {
     EXPECT_EQ(folder.entries(), 0);
 }
 
+TEST(Stack, LayersOfRadianceAreKept) {
+    const TemporaryFolder folder;
+    std::vector<std::string> channels = kCycles;
+    for (const char* c : {"R", "G", "B", "A"}) channels.push_back(std::string("L.DiffDir.") + c);
+    const auto images = writeImages(folder, 3, channels);
+    StackOptions options;
+    options.radiance = {"L.DiffDir", "M.Combined.R"};
+    const ImportReport report = stackImages(images, folder / "dump.exr", options);
+    EXPECT_EQ(report.ignored, (std::vector<std::string>{"L.DiffDir.A", "L.Mist.Z"}));
+    const SampleBand band =
+        DumpReader(folder / "dump.exr").read(kWindow.y, 1, {"L.DiffDir.G", "M.Combined.R"});
+    for (std::size_t i = 0; i < band.samples(); ++i) {
+        const int image = static_cast<int>(i % 3), col = static_cast<int>(i / 3);
+        ASSERT_EQ(band.values[0][i], valueOf(image, 14, col, 0));
+        ASSERT_EQ(band.values[1][i], valueOf(image, 12, col, 0));
+    }
+    options.radiance = {"L.GlossDir"};
+    EXPECT_NE(errorOf([&] {
+                  stackImages(images, folder / "dump.exr", options);
+              }).find("layer of radiance L.GlossDir, found L.Combined.R"),
+              std::string::npos);
+}
+
 }  // namespace
 }  // namespace vlx

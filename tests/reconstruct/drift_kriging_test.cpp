@@ -252,6 +252,71 @@ TEST_F(DriftKriging, OneNonFiniteSampleCostsNoMoreThanItself) {
     }
 }
 
+// A part of the light that is not finite would break the sum: the sample counts as left out.
+TEST_F(DriftKriging, OneNonFinitePartCostsTheSampleAndSumsHold) {
+    SampleBand band = Picture{}.samples();
+    for (const char* layer : {"key", "fill"})
+        for (std::size_t c = 0; c < 3; ++c) {
+            band.channels.push_back(std::string(layer) + "." + "RGB"[c]);
+            std::vector<float> part = band.values[c];
+            for (float& value : part) value *= layer[0] == 'k' ? 0.25f : 0.75f;
+            band.values.push_back(std::move(part));
+        }
+    const DriftKrigingOptions options{.radiance = {"key", "fill"}};
+    const std::size_t bad = 30 * 8 * 70 + 35 * 8 + 3;
+    SampleBand without = band;
+    for (auto& channel : without.values) channel.erase(channel.begin() + static_cast<std::ptrdiff_t>(bad));
+    for (std::uint64_t& offset : without.offsets) offset -= offset > bad;
+    write(without);
+    const Reconstruction expected = krige(options);
+    band.values[7][bad] = std::numeric_limits<float>::quiet_NaN();  // key.G
+    write(band);
+    const Reconstruction found = krige(options);
+    EXPECT_EQ(found.image.pixels, expected.image.pixels);
+    EXPECT_EQ(found.report.droppedSamples, 1);
+    const Image& image = found.image;
+    for (const char* c : {"R", "G", "B"}) {
+        const int whole = image.channel(c), key = image.channel(std::string("key.") + c),
+                  fill = image.channel(std::string("fill.") + c);
+        ASSERT_GE(std::min(key, fill), 0);
+        for (int i = 0; i < image.data.width * image.data.height; ++i) {
+            const float* pixel = image.at(i % image.data.width, i / image.data.width);
+            ASSERT_NEAR(pixel[key] + pixel[fill], pixel[whole], 4e-6);
+        }
+    }
+}
+
+// Premultiplied radiance and its alpha have the same weights: their ratio, the colour, shows no halo.
+TEST_F(DriftKriging, AlphaBelongsToItsRadiance) {
+    Picture picture;
+    picture.features = false;
+    SampleBand band = picture.samples();
+    std::mt19937 random(4);
+    std::bernoulli_distribution hit(0.5);
+    band.channels.emplace_back("A");
+    auto& alpha = band.values.emplace_back();
+    for (std::size_t p = 0; p < band.pixels(); ++p)
+        for (std::size_t s = band.offsets[p]; s < band.offsets[p + 1]; ++s) {
+            const std::size_t col = p % 70;
+            alpha.push_back(col < 30 ? 0.f : col > 40 ? 1.f : hit(random) ? 1.f : 0.f);
+            for (std::size_t c = 0; c < 3; ++c) band.values[c][s] = alpha.back() * (c == 1 ? 0.5f : 2.f);
+        }
+    write(band);
+    const Image image = krige().image;
+    const int a = image.channel("A");
+    for (int row = 0; row < image.data.height; ++row)
+        for (int col = 0; col < image.data.width; ++col) {
+            const float* pixel = image.at(col, row);
+            ASSERT_GE(pixel[a], 0);
+            ASSERT_LE(pixel[a], 1);
+            const bool limited = pixel[a] == 0 || pixel[a] == 1;  // the radiance is not
+            ASSERT_NEAR(pixel[0], 2 * pixel[a], limited ? 5e-3 : 1e-4) << col << " " << row;
+            if (col < 10 || col > 60) {
+                ASSERT_EQ(pixel[a], col < 10 ? 0 : 1);
+            }
+        }
+}
+
 TEST_F(DriftKriging, PixelsWithoutSamplesArePredicted) {
     Picture picture;
     SampleBand band = picture.samples();

@@ -7,6 +7,7 @@
 #include "variolux/base/progress.h"
 #include "variolux/dump/format.h"
 #include "variolux/dump/info.h"
+#include "variolux/dump/sample_source.h"
 
 namespace vlx {
 
@@ -21,6 +22,22 @@ struct ImportReport {
     std::vector<std::string> notes;    ///< decisions worth telling, one sentence each
     std::vector<MissingPart> missing;  ///< what the source lacks, and what that costs
 };
+
+/// Samples made of other files as they are asked for: what the importer of the same name would write into a
+/// dump, bit for bit.
+class ImportedSamples : public SampleSource {
+  public:
+    /// What was taken from where; counts are of the rows read so far.
+    virtual ImportReport report() const = 0;
+};
+
+/// Channels that `name` stands for among `names`: the channel of this name, or the colours of the layer of
+/// this name (name.R .G .B, or .r .g .b, .X .Y .Z, .x .y .z). Empty when there are none.
+std::vector<std::string> radianceChannels(const std::vector<std::string>& names, const std::string& name);
+
+/// Whether a file is a flat image rather than a dump: one that is not OpenEXR, or OpenEXR without deep data.
+/// False when it cannot be read.
+bool isFlatImage(const std::string& path);
 
 /// Files of an image sequence. A path whose file name holds a run of '#' stands for all files whose name has
 /// a number of at least as many digits there (more only without a leading zero), in numeric order; other

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "variolux/dump/import.h"
 
@@ -42,6 +44,9 @@ struct MomentOptions {
     double samples = 0;  ///< samples a pixel; 0: the header's, where the meaning needs it
     CompanionImages with;
     ChannelMap map;  ///< entries override the preset's; variance.R from the channel that holds the variance
+    /// Further channels or layers of radiance (radianceChannels), kept under their names. They have no
+    /// variances: where there are halves, a part of R is scaled as R is, so that parts still add up.
+    std::vector<std::string> radiance = {};
     /// Two samples a pixel: halves of independent noise made of mean and variance (below); else one.
     bool halves = true;
     std::uint64_t seed = 0;  ///< of the halves
@@ -63,13 +68,17 @@ struct MomentOptions {
 /// would have. Without `halves` a pixel is the one sample m with variance v.
 ///
 /// A variance that is not finite, or of fewer samples than it takes, is not known: then the pixel is one
-/// sample m with variance -1. A negative one (rounding of second moments) counts as 0. Variances of X, Y, Z
-/// become those of R, G, B (Rec. 709) as if the errors of X, Y, Z were perfectly correlated, which holds for
-/// noise of one hue. Works by bands of rows. Throws Error when images cannot be read or have different
-/// windows, when R, G, B or a variance cannot be found, when the number of samples is needed and not known,
-/// and as DumpWriter.
+/// sample m with variance -1; a pixel whose mean is not finite is one sample. A negative one (rounding of
+/// second moments) counts as 0. Variances of X, Y, Z become those of R, G, B (Rec. 709) as if the errors of
+/// X, Y, Z were perfectly correlated, which holds for noise of one hue. Works by bands of rows. Throws Error
+/// when images cannot be read or have different windows, when R, G, B or a variance cannot be found, when the
+/// number of samples is needed and not known, and as DumpWriter. The preset Plain finds the layers of
+/// Blender's files too, as StackPreset::Cycles does.
 ImportReport importMoments(const std::string& image, const std::string& dump, const MomentOptions& options,
                            const Progress& progress = {});
+
+/// The same samples without a dump. Memory is that of the rows asked for. Throws as importMoments.
+std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const MomentOptions& options);
 
 struct BufferOptions {
     CompanionImages with;  ///< variance: of the mean of both buffers (VarianceMeaning::OfMean)

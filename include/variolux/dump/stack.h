@@ -21,8 +21,10 @@ enum class StackPreset {
 
 struct StackOptions {
     StackPreset preset = StackPreset::Auto;
-    ChannelMap map;        ///< entries override the preset's (`--map R=Combined.R`)
-    std::string renderer;  ///< for the header; from the first image's metadata when empty
+    ChannelMap map = {};  ///< entries override the preset's (`--map R=Combined.R`)
+    /// Further channels or layers of radiance (radianceChannels), kept under their names.
+    std::vector<std::string> radiance = {};
+    std::string renderer = {};  ///< for the header; from the first image's metadata when empty
     DumpCompression compression = DumpCompression::Zips;
 };
 

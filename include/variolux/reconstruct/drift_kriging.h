@@ -40,7 +40,8 @@
 ///    mean, halved since two halves are averaged, and the spread of the models about the combination.
 ///
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
-/// (parts of light must add up).
+/// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights
+/// too, so that dividing by it leaves no halos; it is kept within 0 to 1.
 ///
 /// A pixel whose samples all agree in radiance and in every feature (of at least 2) is exact and stays.
 namespace vlx {
@@ -67,8 +68,8 @@ struct DriftKrigingOptions {
     double strength = 1;                     ///< 0: the plain mean, 1: the estimate; between: mixed linearly
     bool standardFeatures = true;            ///< use albedo, N and Z where the dump has them
     std::vector<std::string> features = {};  ///< further channels to use as drift
-    std::vector<std::string> radiance =
-        {};  ///< further channels to estimate with the same weights (light groups)
+    /// Further channels, or layers (radianceChannels), to estimate with the same weights: light groups.
+    std::vector<std::string> radiance = {};
 
     int scale = 1;   ///< 1 to 4: pixels of the image along each axis for one of the dump
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
@@ -86,7 +87,7 @@ struct DriftKrigingOptions {
 using RowSink = std::function<void(const float* rows, int count)>;
 
 /// The image that reconstructDriftKriging() makes, without its pixels: windows and channels.
-Image driftKrigingOutline(const DumpReader& dump, const DriftKrigingOptions& options);
+Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& options);
 
 /// With a scale above 1 the samples are sorted into parts of their pixels by their positions, and parts
 /// without samples are predicted; the windows grow by the scale.
@@ -94,14 +95,15 @@ Image driftKrigingOutline(const DumpReader& dump, const DriftKrigingOptions& opt
 /// Reads the dump once, in bands; memory depends on its width, not its height. Bit-identical for any number
 /// of threads. Every channel gets the same weights: parts that add up to R, G, B still do. Channels of the
 /// image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without samples is
-/// predicted from its neighbours and counted. Throws as DumpReader; Error when options are invalid, name
-/// channels that the dump lacks, ask for a scale where it has no positions or for more bands than rows, and
-/// when maxMemory is too little, saying what would do.
-Reconstruction reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
+/// predicted from its neighbours and counted; a sample with radiance that is not finite counts as left out.
+/// Throws as SampleSource::read; Error when options are invalid, name channels that the dump lacks, ask for a
+/// scale where it has no positions or for more bands than rows, and when maxMemory is too little, saying what
+/// would do.
+Reconstruction reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
                                        const Progress& progress = {});
 
 /// The same row by row: the image is never held whole.
-ReconstructionReport reconstructDriftKriging(const DumpReader& dump, const DriftKrigingOptions& options,
+ReconstructionReport reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
                                              const RowSink& sink, const Progress& progress = {});
 
 }  // namespace vlx

@@ -10,7 +10,7 @@ namespace vlx {
 /// what reconstruction must beat. stddev is the standard error of the mean, sqrt(s^2 / n) with the unbiased
 /// sample variance s^2; a pixel of one sample borrows s^2 from the pixels of its 4 x 4 neighbourhood on the
 /// raster (their pooled variance, or else the variance between them). A pixel without samples is zero and
-/// counted. Non-finite samples are dropped and counted. Throws as DumpReader.
-Reconstruction reconstructMean(const DumpReader& dump, const Progress& progress = {});
+/// counted. Non-finite samples are dropped and counted. Throws as SampleSource::read.
+Reconstruction reconstructMean(const SampleSource& dump, const Progress& progress = {});
 
 }  // namespace vlx

@@ -65,8 +65,9 @@ struct RegionEstimate {
 RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, bool inspect = false);
 
 /// The method over a whole dump, region by region. Deterministic for any number of threads.
-/// Throws as DumpReader; Error when options are invalid or a region holds more than kMaxRegionData cells.
-Reconstruction reconstructPaper(const DumpReader& dump, const PaperOptions& options,
+/// Throws as SampleSource::read; Error when options are invalid or a region holds more than kMaxRegionData
+/// cells.
+Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& options,
                                 const Progress& progress = {});
 
 }  // namespace vlx

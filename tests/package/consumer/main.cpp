@@ -9,9 +9,11 @@
 #include "variolux/compare/gaussian.h"
 #include "variolux/compare/metrics.h"
 #include "variolux/dump/reader.h"
+#include "variolux/dump/sample_buffer.h"
 #include "variolux/dump/sample_writer.h"
 #include "variolux/dump/writer.h"
 #include "variolux/geostat/variogram_model.h"
+#include "variolux/reconstruct/drift_kriging.h"
 
 namespace {
 
@@ -76,9 +78,20 @@ void renderTiles() {
         });
     for (auto& thread : threads) thread.join();
     writer.close();
-    const vlx::SampleBand band = vlx::DumpReader("consumer_tiles.exr").read(10, 1, {"R", "sample.x"});
+    const vlx::DumpReader dump("consumer_tiles.exr");
+    const vlx::SampleBand band = dump.read(10, 1, {"R", "sample.x"});
     expect(band.samples() == kSize * kSamples && band.values[0] == band.values[1],
            "a renderer's tiles become a dump");
+
+    // The same samples without a file, as a viewport would.
+    const vlx::SampleBuffer buffer(dump.header(), dump.read(0, kSize));
+    std::int64_t rows = 0;
+    const vlx::Reconstruction shown = vlx::reconstructDriftKriging(
+        buffer, {.quality = vlx::Quality::Draft}, [&](std::int64_t done, std::int64_t) { rows = done; });
+    expect(rows == kSize, "a reconstruction tells its progress");
+    expect(shown.image.pixels ==
+               vlx::reconstructDriftKriging(dump, {.quality = vlx::Quality::Draft}).image.pixels,
+           "samples in memory give the image that a dump gives");
 }
 
 void useGeostatistics() {

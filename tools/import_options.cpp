@@ -1,0 +1,102 @@
+#include "import_options.h"
+
+#include "tool_main.h"
+
+namespace vlx {
+
+ChannelMap parseMappings(const std::vector<std::string>& mappings) {
+    ChannelMap map;
+    for (const auto& mapping : mappings) {
+        const std::size_t sign = mapping.find('=');
+        if (sign == 0 || sign == std::string::npos || sign + 1 == mapping.size())
+            throw CLI::ValidationError("--map", "expected NAME=SOURCE, found '" + mapping + "'");
+        map[mapping.substr(0, sign)] = mapping.substr(sign + 1);
+    }
+    return map;
+}
+
+void bindMap(CLI::App& app, std::vector<std::string>& mappings) {
+    app.add_option("--map", mappings,
+                   "Take a dump's channel from an image's, for example R=Combined.R; goes before the preset")
+        ->type_name("NAME=SOURCE")
+        ->expected(1)
+        ->take_all();
+}
+
+void bindCompanions(CLI::App& app, CompanionImages& with) {
+    app.add_option("--albedo", with.albedo, "Image of the albedo, if it is not in the same file");
+    app.add_option("--normal", with.normal, "Image of the normals, likewise");
+    app.add_option("--depth", with.depth, "Image of the distance, likewise");
+}
+
+void bindSamples(CLI::App& app, double& samples) {
+    app.add_option("--samples", samples, "Samples a pixel, where the variance is of single ones")
+        ->check(CLI::Range(1.0, 1e9));
+}
+
+void MomentFlags::bind(CLI::App& app, const std::string& group) {
+    const std::vector<CLI::Option*> before = app.get_options();
+    using enum MomentPreset;
+    addChoice(app, "--preset", options_.preset,
+              {{"auto", Auto},
+               {"pbrt", Pbrt},
+               {"mitsuba", Mitsuba},
+               {"tungsten", Tungsten},
+               {"arnold", Arnold},
+               {"renderman", RenderMan},
+               {"plain", Plain}},
+              "Whose channels and whose idea of variance; plain: R, G, B and variance.R, .G, .B");
+    addChoice(app, "--variance-is", meaning_,
+              {{"preset", Meaning::Preset},
+               {"sample", Meaning::Sample},
+               {"mean", Meaning::Mean},
+               {"second-moment", Meaning::Second}},
+              "Of a single sample, of the pixel's mean, or the mean of squares");
+    addChoice(app, "--variance-of", colours_,
+              {{"preset", Colours::Preset}, {"rgb", Colours::Rgb}, {"xyz", Colours::Xyz}},
+              "Colours that the variance belongs to: pbrt's default sensor and Mitsuba have X, Y, Z");
+    app.add_option("--variance", options_.with.variance, "Image of the variance, if it is another file");
+    bindCompanions(app, options_.with);
+    bindSamples(app, options_.samples);
+    bindMap(app, mappings_);
+    bound_ = app.get_options();
+    bound_.erase(bound_.begin(), bound_.begin() + static_cast<std::ptrdiff_t>(before.size()));
+    for (CLI::Option* option : bound_) option->group(group);
+}
+
+std::string MomentFlags::given(bool mapCounts) const {
+    for (const CLI::Option* option : bound_)
+        if (option->count() > 0 && (mapCounts || option->get_name() != "--map")) return option->get_name();
+    return {};
+}
+
+MomentOptions MomentFlags::options() const {
+    MomentOptions options = options_;
+    options.map = parseMappings(mappings_);
+    if (meaning_ == Meaning::Sample) options.meaning = VarianceMeaning::OfSample;
+    if (meaning_ == Meaning::Mean) options.meaning = VarianceMeaning::OfMean;
+    if (meaning_ == Meaning::Second) options.meaning = VarianceMeaning::SecondMoment;
+    if (colours_ != Colours::Preset) options.xyz = colours_ == Colours::Xyz;
+    return options;
+}
+
+std::vector<std::string> MomentFlags::files() const {
+    const CompanionImages& with = options_.with;
+    return {with.variance, with.albedo, with.normal, with.depth};
+}
+
+std::vector<std::string*> MomentFlags::fileNames() {
+    CompanionImages& with = options_.with;
+    return {&with.variance, &with.albedo, &with.normal, &with.depth};
+}
+
+std::string toText(const ImportReport& report) {
+    std::string text;
+    for (const auto& [channel, source] : report.mapped) text += "  " + channel + " from " + source + "\n";
+    for (const auto& name : report.ignored) text += "  left out: " + name + "\n";
+    for (const auto& part : report.missing) text += "  lacks " + part.what + ": " + part.cost + "\n";
+    for (const auto& note : report.notes) text += note + "\n";
+    return text;
+}
+
+}  // namespace vlx
