@@ -342,12 +342,12 @@ struct TraceCommand {
             const nlohmann::ordered_json features{{"albedo", plan.features.albedo},
                                                   {"normal", plan.features.normalAndDepth},
                                                   {"depth", plan.features.normalAndDepth}};
-            const nlohmann::ordered_json integrator{{"chosen", nameOf(choice.chosen)},
+            const nlohmann::ordered_json chosen{{"chosen", nameOf(choice.chosen)},
                                                     {"reason", choice.reason}};
             std::cout << nlohmann::ordered_json{{"effects", list},
                                                 {"lights", loaded.lights.size()},
                                                 {"recorded", features},
-                                                {"integrator", integrator}}
+                                                {"integrator", chosen}}
                              .dump(2)
                       << "\n";
             return vlx::kDone;

@@ -1,6 +1,5 @@
 #include "variolux/compare/sweep.h"
 
-#include <sys/utsname.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,13 +15,14 @@
 #include <sstream>
 #include <thread>
 
+#include "machine.h"
+#include "sweep_images.h"
 #include "sweep_store.h"
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
 #include "variolux/compare/child_process.h"
-#include "variolux/compare/gaussian.h"
 #include "variolux/compare/metrics.h"
 
 namespace vlx {
@@ -78,78 +78,6 @@ Json reportOf(const ProcessRun& run, const std::string& command) {
     Json report = Json::parse(run.out, nullptr, false);
     if (!report.is_object()) throw Error(command, "expected a JSON report on standard output");
     return report;
-}
-
-double loadAverage() {
-    double load = 0;
-    return ::getloadavg(&load, 1) == 1 ? load : kNan;
-}
-
-struct ReferenceImage {
-    Image colour;
-    std::optional<Image> stddev;
-};
-
-/// See SweepMethod, {sigma}.
-double bestSigma(const Image& average, const Image& reference, const std::string& path) {
-    double best = 0, least = std::numeric_limits<double>::infinity();
-    constexpr int kSteps = 24;
-    for (int i = 0; i <= kSteps; ++i) {
-        const double sigma = std::round(200 * std::pow(20.0, static_cast<double>(i) / kSteps)) / 1000;
-        const double error =
-            compareColour(reference, gaussianFilter(average, sigma).image, path)[Metric::RelMse];
-        if (error < least) {
-            least = error;
-            best = sigma;
-        }
-    }
-    if (best == 0) throw Error(path, "expected an average that can be compared with the reference");
-    return best;
-}
-
-/// Pixels to inspect: `count` of an even grid, and a quarter as many where the error is largest in squares of
-/// 8 x 8 pixels (one a square, so that they do not all sit on one firefly).
-std::vector<std::pair<int, int>> inspectedPixels(const Image& error, int count) {
-    const Window& window = error.data;
-    std::vector<std::pair<int, int>> places;
-    const double area = static_cast<double>(window.pixels()) / std::max(count, 1);
-    const int columns = std::max(1, static_cast<int>(std::lround(window.width / std::sqrt(area))));
-    const int rows = std::max(1, count / columns);
-    for (int row = 0; row < rows; ++row)
-        for (int col = 0; col < columns; ++col)
-            places.emplace_back(window.x + (2 * col + 1) * window.width / (2 * columns),
-                                window.y + (2 * row + 1) * window.height / (2 * rows));
-
-    struct Square {
-        float error = -1;
-        int x = 0, y = 0;
-    };
-    constexpr int kSide = 8;
-    const int across = (window.width + kSide - 1) / kSide;
-    std::vector<Square> squares(static_cast<std::size_t>(across) *
-                                static_cast<std::size_t>((window.height + kSide - 1) / kSide));
-    for (int row = 0; row < window.height; ++row)
-        for (int col = 0; col < window.width; ++col) {
-            const float* e = error.at(col, row);
-            const float sum = e[0] + e[1] + e[2];
-            Square& square = squares[static_cast<std::size_t>(row / kSide * across + col / kSide)];
-            if (sum > square.error) square = {sum, window.x + col, window.y + row};
-        }
-    std::stable_sort(squares.begin(), squares.end(),
-                     [](const Square& a, const Square& b) { return a.error > b.error; });
-    for (std::size_t i = 0; i < squares.size() && i < static_cast<std::size_t>(count) / 4; ++i)
-        if (squares[i].error >= 0) places.emplace_back(squares[i].x, squares[i].y);
-    return places;
-}
-
-/// |x - r|, or without a reference the predicted error.
-Image errorImage(const Image& colour, const std::optional<Image>& stddev,
-                 const std::optional<ReferenceImage>& reference) {
-    if (!reference) return stddev ? *stddev : Image(colour.data, colour.channels);
-    Image error = colour;
-    for (std::size_t i = 0; i < error.pixels.size(); ++i)
-        error.pixels[i] = std::abs(colour.pixels[i] - reference->colour.pixels[i]);
-    return error;
 }
 
 /// One sweep while it runs.
@@ -659,22 +587,6 @@ class Runner {
 };
 
 }  // namespace
-
-Machine thisMachine() {
-    Machine machine;
-    std::ifstream cpu("/proc/cpuinfo");
-    for (std::string line; std::getline(cpu, line);)
-        if (line.starts_with("model name")) {
-            machine.processor = line.substr(std::min(line.size(), line.find(':') + 2));
-            break;
-        }
-    machine.processors = static_cast<int>(std::thread::hardware_concurrency());
-    machine.memoryGigabytes = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) *
-                              static_cast<double>(::sysconf(_SC_PAGE_SIZE)) / (1 << 30);
-    utsname system{};
-    if (::uname(&system) == 0) machine.system = std::string(system.sysname) + " " + system.release;
-    return machine;
-}
 
 Sweep runSweep(SweepOptions options, const std::function<void(const std::string&)>& log) {
     return Runner(std::move(options), log).run();

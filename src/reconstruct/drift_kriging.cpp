@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "combination.h"
 #include "neighbourhoods.h"
+#include "pixel_data.h"
 #include "pixel_statistics.h"
 #include "prefilter.h"
 #include "rebin.h"
@@ -18,10 +20,6 @@ namespace vlx {
 namespace {
 
 constexpr int kReadRows = 16;
-constexpr int kFireflyReach = 2;         // pixels: the neighbourhood of a firefly is 5 x 5 pixels
-constexpr int kHoleReach = 5;            // pixels: how far a pixel without samples looks for some
-constexpr int kStackReach = 10;          // pixels: triangular window of 21 x 21 pixels
-constexpr double kMeanSignificance = 1;  // standard errors by which the plain mean must improve
 // Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them. With
 // tiles of 32 rows, centres that reach 15 and patches that reach 3, data are filled 160 rows ahead of the row
 // that is combined; the others are used up earlier.
@@ -35,8 +33,6 @@ constexpr int kEstimateRows = 64;  // and moments
 // that it maps, and each thread's tiles.
 constexpr std::uint64_t kProcessBytes = 150'000'000;
 constexpr std::uint64_t kThreadBytes = 8'000'000;
-
-constexpr std::pair<int, int> kNeighbours[] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
 
 /// The last one is the small one, which the first is shrunk towards.
 std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
@@ -53,13 +49,6 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality) {
 
 Window scaled(const Window& window, int scale) {
     return {window.x * scale, window.y * scale, window.width * scale, window.height * scale};
-}
-
-/// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
-double coverage(double alpha) {
-    constexpr double kRounding = 1e-5;
-    if (alpha < kRounding) return 0;
-    return alpha > 1 - kRounding ? 1 : alpha;
 }
 
 class Stopwatch {
@@ -93,10 +82,15 @@ class Pipeline {
           readRows_(kReadRows / options.scale),
           radiance_(layout_.radiance),
           gathered_(width_, planes_.channels, kGatheredRows),
-          data_(width_, 2 * radiance_ + 4, kDataRows),
+          data_(width_, dataPlanes(radiance_), kDataRows),
           squares_(width_, 4, kDataRows),
           features_(width_, 2 * layout_.features, kFeatureRows),
-          variances_(width_, 3, kFeatureRows) {
+          variances_(width_, 3, kFeatureRows),
+          moments_(width_, Combination::momentPlanes(static_cast<int>(models_.size())), kEstimateRows),
+          pixels_(layout_, planes_, width_, height_, options.fireflies == Fireflies::Robust, gathered_, data_,
+                  squares_),
+          combination_(radiance_, layout_.alpha, options.strength, width_, height_, data_, variances_,
+                       estimates_, moments_) {
         if (layout_.features + 5 > kMaxRandomDrift || radiance_ > kMaxRandomDrift)
             throw Error(dump.path(), "expected at most " + std::to_string(kMaxRandomDrift - 5) +
                                          " features and " + std::to_string(kMaxRandomDrift) +
@@ -107,9 +101,6 @@ class Pipeline {
             sums_.emplace_back(width_, planes.channels(), kSumRows);
             estimates_.emplace_back(width_, 2 * radiance_ + 3, kEstimateRows);
         }
-        const int candidates = static_cast<int>(models_.size());  // models but one, and the mean
-        momentPlanes_ = candidates * (candidates + 1) / 2 + 2 * candidates;
-        moments_ = RowRing(width_, momentPlanes_, kEstimateRows);
         const Window window = driftKrigingOutline(dump, options).data;
         firstRow_ = window.y - scaled(dump.header().data, options.scale).y;
         endRow_ = firstRow_ + window.height;
@@ -226,157 +217,19 @@ class Pipeline {
         if (dataRows_ >= until) return;
         gather(until + kHoleReach);
         const int first = dataRows_;
-        struct Removed {
-            std::int64_t samples = 0;
-            double luminance = 0;
-        };
-        std::vector<Removed> removed(static_cast<std::size_t>(until - first));
-        parallelFor(first, until, [&](std::int64_t line) {
-            const int y = static_cast<int>(line);
-            Removed& of = removed[static_cast<std::size_t>(y - first)];
-            for (int x = 0; x < width_; ++x) {
-                if (gathered_.row(planes_.count, y)[x] == 0) fillHole(x, y);
-                limitPixel(x, y, of.samples, of.luminance);
-            }
+        std::vector<LimitedRow> limited(static_cast<std::size_t>(until - first));
+        parallelFor(first, until, [&](std::int64_t y) {
+            limited[static_cast<std::size_t>(y - first)] = pixels_.fillRow(static_cast<int>(y));
         });
         for (int y = first; y < until; ++y) {
             if (!own(y)) continue;
-            const Removed& of = removed[static_cast<std::size_t>(y - first)];
+            const LimitedRow& of = limited[static_cast<std::size_t>(y - first)];
             report_.limitedSamples += of.samples;
             removed_ += of.luminance;
         }
         report_.energyRemoved = luminance_ > 0 ? removed_ / luminance_ : 0;
         dataRows_ = until;
         watch_.addTo(report_.seconds["statistics"]);
-    }
-
-    /// A pixel without samples gets the means and features of the nearest one that has some, so that it is
-    /// alike to what is around it. Its counts stay 0: it is predicted, but is no datum.
-    void fillHole(int x, int y) {
-        int nearest = kHoleReach * kHoleReach + 1, fromX = -1, fromY = -1;
-        for (int row = std::max(0, y - kHoleReach); row <= std::min(height_ - 1, y + kHoleReach); ++row)
-            for (int col = std::max(0, x - kHoleReach); col <= std::min(width_ - 1, x + kHoleReach); ++col) {
-                const int distance = (col - x) * (col - x) + (row - y) * (row - y);
-                if (distance >= nearest || gathered_.row(planes_.count, row)[col] == 0) continue;
-                nearest = distance;
-                fromX = col;
-                fromY = row;
-            }
-        if (fromX < 0) return;
-        for (const auto& [first, planes] :
-             {std::pair{planes_.meanA, 2 * radiance_}, {planes_.feature, 2 * layout_.features}})
-            for (int k = first; k < first + planes; ++k)
-                gathered_.row(k, y)[x] = gathered_.row(k, fromY)[fromX];
-    }
-
-    void limitPixel(int x, int y, std::int64_t& samples, double& luminance) {
-        const auto raw = [&](int plane) { return gathered_.row(plane, y)[x]; };
-        const float nA = raw(planes_.countA), nB = raw(planes_.countB);
-        const float n = raw(planes_.count);
-        data_.row(2 * radiance_ + 2, y)[x] = n;
-        data_.row(2 * radiance_, y)[x] = nA;
-        data_.row(2 * radiance_ + 1, y)[x] = nB;
-        for (int c = 0; c < radiance_; ++c) {
-            data_.row(c, y)[x] = halfMean(planes_.countA, planes_.meanA + c, x, y);
-            data_.row(radiance_ + c, y)[x] = halfMean(planes_.countB, planes_.meanB + c, x, y);
-        }
-        float squares[3];
-        for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares + c);
-
-        const float brightest = raw(planes_.brightestLuminance);
-        if (options_.fireflies == Fireflies::Robust && brightest > 0) {
-            const float most = secondBrightest(x, y);
-            if (brightest > most) {
-                const float change = most / brightest - 1;  // of every radiance channel of that sample
-                const int half = raw(planes_.brightestHalf) > 0 ? 1 : 0;
-                const float halfCount = half == 0 ? nA : nB;
-                for (int c = 0; c < radiance_; ++c) {
-                    if (c == layout_.alpha) continue;
-                    const float old = raw(planes_.brightest + c), step = change * old;
-                    if (c < 3) {
-                        const float mean =
-                            (data_.row(c, y)[x] * nA + data_.row(radiance_ + c, y)[x] * nB) / (nA + nB);
-                        squares[c] =
-                            std::max(0.f, squares[c] + step * (2 * old + step - 2 * mean) - step * step / n);
-                    }
-                    data_.row(half * radiance_ + c, y)[x] += step / halfCount;
-                }
-                ++samples;
-                luminance += static_cast<double>(brightest - most);
-            }
-        }
-        float freedom = raw(planes_.freedom);
-        if (n == 1 && freedom == 0) borrowSquares(x, y, squares, freedom);
-        for (int c = 0; c < 3; ++c) squares_.row(c, y)[x] = squares[c];
-        squares_.row(3, y)[x] = freedom;
-        data_.row(2 * radiance_ + 3, y)[x] = isExact(x, y) ? 1 : 0;
-    }
-
-    bool isExact(int x, int y) const {
-        if (layout_.features == 0 || squares_.row(3, y)[x] < 1) return false;
-        for (int c = 0; c < 3; ++c)
-            if (squares_.row(c, y)[x] > 0) return false;
-        for (int f = 0; f < layout_.features; ++f)
-            if (gathered_.row(planes_.featureError + f, y)[x] > 0) return false;
-        return true;
-    }
-
-    /// Mean of a half. Where a pixel has no sample of it, what its neighbours have on average stands in, with
-    /// count 0: no datum, but something for patches to be alike to.
-    float halfMean(int count, int mean, int x, int y) const {
-        const float own = gathered_.row(mean, y)[x];
-        if (gathered_.row(count, y)[x] > 0 || gathered_.row(planes_.count, y)[x] == 0) return own;
-        float sum = 0;
-        int found = 0;
-        for (const auto& [dx, dy] : kNeighbours) {
-            if (x + dx < 0 || x + dx >= width_ || y + dy < 0 || y + dy >= height_) continue;
-            if (gathered_.row(count, y + dy)[x + dx] == 0) continue;
-            sum += gathered_.row(mean, y + dy)[x + dx];
-            ++found;
-        }
-        return found > 0 ? sum / static_cast<float>(found) : own;
-    }
-
-    /// The second largest luminance of a sample within kFireflyReach.
-    float secondBrightest(int x, int y) const {
-        float most = 0, second = 0;
-        for (int row = std::max(0, y - kFireflyReach); row <= std::min(height_ - 1, y + kFireflyReach); ++row)
-            for (int col = std::max(0, x - kFireflyReach); col <= std::min(width_ - 1, x + kFireflyReach);
-                 ++col)
-                for (const int plane : {planes_.brightestLuminance, planes_.secondLuminance}) {
-                    const float l = gathered_.row(plane, row)[col];
-                    if (l > most) {
-                        second = most;
-                        most = l;
-                    } else {
-                        second = std::max(second, l);
-                    }
-                }
-        return second;
-    }
-
-    /// A pixel of one sample has no variance of its own: half the mean squared difference from its four
-    /// neighbours stands in, with so little weight that it counts only where no pixel around has better.
-    void borrowSquares(int x, int y, float* squares, float& freedom) const {
-        constexpr float kFreedom = 1e-3f;
-        float sum[3] = {};
-        int pairs = 0;
-        const auto mean = [&](int c, int col, int row) {
-            const bool inA = gathered_.row(planes_.countA, row)[col] > 0;
-            return gathered_.row((inA ? planes_.meanA : planes_.meanB) + c, row)[col];
-        };
-        for (const auto& [dx, dy] : kNeighbours) {
-            if (x + dx < 0 || x + dx >= width_ || y + dy < 0 || y + dy >= height_) continue;
-            if (gathered_.row(planes_.count, y + dy)[x + dx] == 0) continue;
-            ++pairs;
-            for (int c = 0; c < 3; ++c) {
-                const float d = mean(c, x, y) - mean(c, x + dx, y + dy);
-                sum[c] += 0.5f * d * d;
-            }
-        }
-        if (pairs == 0) return;
-        for (int c = 0; c < 3; ++c) squares[c] = kFreedom * sum[c] / static_cast<float>(pairs);
-        freedom = kFreedom;
     }
 
     void prefilter(int until) {
@@ -451,7 +304,7 @@ class Pipeline {
         parallelFor(finishedRows_, until, [&](std::int64_t y) {
             for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
             if (models_.size() > 1) shrinkRow(static_cast<int>(y));
-            momentsRow(static_cast<int>(y));
+            combination_.momentsRow(static_cast<int>(y));
         });
         finishedRows_ = until;
         watch_.addTo(report_.seconds["combining"]);
@@ -502,176 +355,20 @@ class Pipeline {
         }
     }
 
-    int candidates() const { return static_cast<int>(models_.size()); }
-
-    /// Estimate of a half by model `j`; the last candidate is the half's plain mean.
-    float estimate(int j, int half, int c, int x, int y) const {
-        return j == candidates() ? data_.row(half * radiance_ + c, y)[x]
-                                 : estimates_[static_cast<std::size_t>(j)].row(half * radiance_ + c, y)[x];
-    }
-
-    /// Variance of the mean of half of a pixel's samples, averaged over colours; never 0, nor so small beside
-    /// the candidates that their squares in units of it are no floats.
-    double halfVariance(int x, int y) const {
-        double variance = 0, level = 0;
-        const float n = data_.row(2 * radiance_ + 2, y)[x];
-        for (int c = 0; c < 3; ++c) {
-            variance += 2 * variances_.row(c, y)[x] / std::max(1.f, n) / 3;
-            for (int j = 0; j <= candidates(); ++j)
-                for (int half = 0; half < 2; ++half) {
-                    const double value = estimate(j, half, c, x, y);
-                    level = std::max(level, value * value);
-                }
-        }
-        return variance + 1e-8 * level + 1e-300;
-    }
-
-    void momentsRow(int y) {
-        const int m = candidates();
-        std::vector<double> sums(static_cast<std::size_t>(momentPlanes_)), e(static_cast<std::size_t>(m + 1)),
-            squares(static_cast<std::size_t>(m));
-        for (int x = 0; x < width_; ++x) {
-            std::fill(sums.begin(), sums.end(), 0.0);
-            std::fill(squares.begin(), squares.end(), 0.0);
-            const double unit = 1 / halfVariance(x, y);
-            for (int c = 0; c < 3; ++c)
-                for (int half = 0; half < 2; ++half) {
-                    // What is predicted is the other half's mean; one's own may be missing (a single sample).
-                    if (data_.row(2 * radiance_ + 1 - half, y)[x] == 0) continue;
-                    const double base = estimate(0, half, c, x, y);
-                    const double other = data_.row((1 - half) * radiance_ + c, y)[x] - base;
-                    for (int j = 1; j <= m; ++j)
-                        e[static_cast<std::size_t>(j)] = estimate(j, half, c, x, y) - base;
-                    if (data_.row(2 * radiance_ + half, y)[x] == 0) e.back() = 0;
-                    std::size_t at = 0;
-                    for (int i = 1; i <= m; ++i)
-                        for (int j = 1; j <= i; ++j)
-                            sums[at++] +=
-                                e[static_cast<std::size_t>(i)] * e[static_cast<std::size_t>(j)] * unit;
-                    for (int j = 1; j <= m; ++j) {
-                        const double product = e[static_cast<std::size_t>(j)] * other * unit;
-                        sums[at++] += product;
-                        squares[static_cast<std::size_t>(j - 1)] += product;
-                    }
-                }
-            for (int j = 0; j < m; ++j)
-                sums[sums.size() - static_cast<std::size_t>(m - j)] =
-                    squares[static_cast<std::size_t>(j)] * squares[static_cast<std::size_t>(j)];
-            for (int k = 0; k < momentPlanes_; ++k)
-                moments_.row(k, y)[x] = static_cast<float>(sums[static_cast<std::size_t>(k)]);
-        }
-    }
-
     void combine(int until) {
         until = std::min(until, height_);
         finish(until + kStackReach);
         std::vector<std::int64_t> exact(static_cast<std::size_t>(until - combinedRows_));
         parallelFor(combinedRows_, until, [&](std::int64_t y) {
-            exact[static_cast<std::size_t>(y - combinedRows_)] = combineRow(static_cast<int>(y));
+            const auto row = static_cast<int>(y) - combinedRows_;
+            exact[static_cast<std::size_t>(row)] =
+                combination_.combineRow(static_cast<int>(y), rows_.at(0, row));
         });
         for (const std::int64_t of : exact) report_.exactPixels += of;
         watch_.addTo(report_.seconds["combining"]);
         sink_(rows_.pixels.data(), until - combinedRows_);
         combinedRows_ = until;
         watch_.addTo(report_.seconds["output"]);
-    }
-
-    std::int64_t combineRow(int y) {
-        const int m = candidates();
-        const auto w = static_cast<std::size_t>(width_);
-        // Moments averaged under a triangular window, first over rows.
-        std::vector<double> columns(w * static_cast<std::size_t>(momentPlanes_));
-        for (int row = std::max(0, y - kStackReach); row <= std::min(height_ - 1, y + kStackReach); ++row)
-            for (int k = 0; k < momentPlanes_; ++k) {
-                const double weight = kStackReach + 1 - std::abs(row - y);
-                const float* in = moments_.row(k, row);
-                double* out = columns.data() + static_cast<std::size_t>(k) * w;
-                for (std::size_t i = 0; i < w; ++i) out[i] += weight * in[i];
-            }
-        StackingMoments moments{Eigen::MatrixXd(m, m), Eigen::VectorXd(m), Eigen::VectorXd(m)};
-        Eigen::VectorXd significance = Eigen::VectorXd::Zero(m);
-        significance[m - 1] = kMeanSignificance;
-        std::vector<double> sums(static_cast<std::size_t>(momentPlanes_));
-        constexpr double kUnit = 1.0 / ((kStackReach + 1) * (kStackReach + 1));  // centre weight 1
-        std::int64_t exact = 0;
-        for (int x = 0; x < width_; ++x) {
-            std::fill(sums.begin(), sums.end(), 0.0);
-            for (int col = std::max(0, x - kStackReach); col <= std::min(width_ - 1, x + kStackReach);
-                 ++col) {
-                const double weight = (kStackReach + 1 - std::abs(col - x)) * kUnit;
-                for (int k = 0; k < momentPlanes_; ++k)
-                    sums[static_cast<std::size_t>(k)] +=
-                        weight * columns[static_cast<std::size_t>(k) * w + static_cast<std::size_t>(col)];
-            }
-            std::size_t at = 0;
-            for (int i = 0; i < m; ++i)
-                for (int j = 0; j <= i; ++j) moments.products(i, j) = moments.products(j, i) = sums[at++];
-            for (int j = 0; j < m; ++j) moments.agreement[j] = sums[at++];
-            for (int j = 0; j < m; ++j) moments.standardError[j] = std::sqrt(sums[at++]);
-            store(x, y, stackingWeights(moments, significance), exact);
-        }
-        return exact;
-    }
-
-    void store(int x, int y, const Eigen::VectorXd& weights, std::int64_t& exact) {
-        const int m = candidates();
-        float* out = rows_.at(x, y - combinedRows_);
-        const float nA = data_.row(2 * radiance_, y)[x], nB = data_.row(2 * radiance_ + 1, y)[x];
-        const float n = data_.row(2 * radiance_ + 2, y)[x];
-        const bool known = data_.row(2 * radiance_ + 3, y)[x] > 0;
-        exact += known;
-        for (int c = 0; c < radiance_; ++c) {
-            const double mean =
-                n > 0 ? (nA * data_.row(c, y)[x] + nB * data_.row(radiance_ + c, y)[x]) / (nA + nB) : 0;
-            const auto both = [&](int j) {
-                return j == m && n > 0 ? mean : 0.5 * (estimate(j, 0, c, x, y) + estimate(j, 1, c, x, y));
-            };
-            const double rest = 1 - weights.sum();
-            double value = rest * both(0);
-            for (int j = 1; j <= m; ++j) value += weights[j - 1] * both(j);
-            const double strength = n > 0 ? options_.strength : 1;
-            // Light is not negative. Parts of light must add up: they are left as they come.
-            if (c == layout_.alpha)
-                value = coverage(value);
-            else if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0)
-                value = std::max(0.0, value);
-            const double chosen = known ? mean : value;
-            out[c] = static_cast<float>(mean + strength * (chosen - mean));
-            if (c >= 3) continue;
-            // What neighbourhoods share (the noise of their common data), what they differ in, and what
-            // models differ in.
-            const double meanVariance = variances_.row(c, y)[x] / std::max(1.f, n);
-            double variance = sharedVariance(weights, c, x, y);
-            for (int j = 0; j <= m; ++j) {
-                const double share = j == 0 ? rest : weights[j - 1];
-                const double within =
-                    j == m ? meanVariance
-                           : estimates_[static_cast<std::size_t>(j)].row(2 * radiance_ + c, y)[x] / 2;
-                const double d = both(j) - value;
-                variance += share * (within + d * d);
-            }
-            const double s = strength;
-            out[radiance_ + c] =
-                static_cast<float>(known ? 0 : std::sqrt(s * variance + (1 - s) * meanVariance));
-        }
-    }
-
-    /// Variance of the mean of the two halves' combinations, from their difference, over 5 x 5 pixels.
-    double sharedVariance(const Eigen::VectorXd& weights, int c, int x, int y) const {
-        constexpr int kReach = 2;
-        double sum = 0;
-        int count = 0;
-        for (int row = std::max(0, y - kReach); row <= std::min(height_ - 1, y + kReach); ++row)
-            for (int col = std::max(0, x - kReach); col <= std::min(width_ - 1, x + kReach); ++col) {
-                const auto difference = [&](int j) {
-                    return static_cast<double>(estimate(j, 0, c, col, row)) - estimate(j, 1, c, col, row);
-                };
-                double d = (1 - weights.sum()) * difference(0);
-                for (int j = 1; j <= candidates(); ++j) d += weights[j - 1] * difference(j);
-                sum += d * d / 4;
-                ++count;
-            }
-        return sum / count;
     }
 
     const SampleSource& dump_;
@@ -681,13 +378,15 @@ class Pipeline {
     SampleLayout layout_;
     GatheredPlanes planes_;
     std::vector<NeighbourhoodModel> models_;
-    int width_, height_, readRows_, radiance_, momentPlanes_ = 0;
+    int width_, height_, readRows_, radiance_;
     RowRing gathered_;
-    RowRing data_;     // means of A, means of B, counts of A, B, both; whether exact
+    RowRing data_;     // pixel_data.h
     RowRing squares_;  // sums of squares of R, G, B; their degrees of freedom
     RowRing features_, variances_;
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: A, B, spread of R, G, B
     RowRing moments_;
+    PixelData pixels_;
+    Combination combination_;
     int firstRow_ = 0, endRow_ = 0;  // of the band
     int gatheredRows_ = 0, dataRows_ = 0, featureRows_ = 0, varianceRows_ = 0, krigedRows_ = 0,
         zeroedRows_ = 0, finishedRows_ = 0, combinedRows_ = 0;
