@@ -342,8 +342,7 @@ struct TraceCommand {
             const nlohmann::ordered_json features{{"albedo", plan.features.albedo},
                                                   {"normal", plan.features.normalAndDepth},
                                                   {"depth", plan.features.normalAndDepth}};
-            const nlohmann::ordered_json chosen{{"chosen", nameOf(choice.chosen)},
-                                                    {"reason", choice.reason}};
+            const nlohmann::ordered_json chosen{{"chosen", nameOf(choice.chosen)}, {"reason", choice.reason}};
             std::cout << nlohmann::ordered_json{{"effects", list},
                                                 {"lights", loaded.lights.size()},
                                                 {"recorded", features},

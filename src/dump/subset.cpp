@@ -117,7 +117,7 @@ SubsetReport subsetDump(const std::string& input, const std::string& output, con
 
     DumpHeader header = reader.header();
     header.extra.erase(kInputsAttribute);  // of the whole dump
-    header.splatReplicates = 0;  // the samples hold them
+    header.splatReplicates = 0;            // the samples hold them
     const Window window = header.data;
     header.compression = options.compression;
     const std::optional<double> renderSeconds = header.renderSeconds;

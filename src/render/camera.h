@@ -37,7 +37,8 @@ class View {
         Vec3 origin;        ///< on the lens
         float density = 0;  ///< pixels per steradian about the direction from `origin`; 0: not in front of it
     };
-    /// The inverse of ray(): the raster position whose ray, from this point of the lens, goes through `point`.
+    /// The inverse of ray(): the raster position whose ray, from this point of the lens, goes through
+    /// `point`.
     Projection project(const Vec3& point, Vec2 lens, float time = 0) const;
 
     bool hasLens() const { return lensRadius_ > 0; }
