@@ -257,7 +257,10 @@ TEST(RenderDumpBidirectional, SaysWhatItCannotDo) {
     };
     EXPECT_EQ(fault([](RenderOptions&) {}), "");
     EXPECT_NE(fault([](RenderOptions& o) { o.hierarchical = true; }).find("hierarchical"), std::string::npos);
-    EXPECT_NE(fault([](RenderOptions& o) { o.band = {1, 3}; }).find("--integrator path"), std::string::npos)
+    EXPECT_NE(fault([](RenderOptions& o) {
+                  o.band = {1, 3};
+              }).find("--integrator path"),
+              std::string::npos)
         << "bands would lack each other's splats";
     EXPECT_NE(fault([](RenderOptions& o) { o.spp = 67; }).find("divisor"), std::string::npos);
     EXPECT_NE(fault([](RenderOptions& o) { o.spp = o.replicates = 65; }).find("at most 64"),
