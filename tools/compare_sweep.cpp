@@ -83,7 +83,7 @@ struct SweepCommand {
             ->check(CLI::PositiveNumber)
             ->option_text("S")
             ->group(sampling);
-        app.add_flag("--keep-dumps", o.keepDumps, "Keep the dumps in FOLDER/work")->group(sampling);
+        app.add_flag("--keep-dumps", o.keepDumps, "Keep the dumps in FOLDER/scratch")->group(sampling);
 
         const char* const how = "Methods";
         std::string names;

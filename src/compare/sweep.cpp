@@ -90,7 +90,7 @@ class Runner {
         prepare();
         std::error_code status;
         fs::create_directories(options_.folder + "/images", status);
-        fs::create_directories(options_.folder + "/work", status);
+        fs::create_directories(scratch(), status);
         if (status) throw Error(options_.folder, "expected to make this folder: " + status.message());
         ResultsFile results(options_.folder + "/results.jsonl");
         results_ = &results;
@@ -98,7 +98,7 @@ class Runner {
         for (int seed = 1; seed <= options_.seeds; ++seed)
             for (const SweepSampling& sampling : samplings_)
                 if (seed <= repetitions(sampling)) runSampling(sampling, seed);
-        if (!options_.keepDumps) fs::remove_all(options_.folder + "/work", status);
+        if (!options_.keepDumps) fs::remove_all(scratch(), status);
         writeCsv();
         results_ = nullptr;
         sweep_.options = options_;
@@ -326,10 +326,13 @@ class Runner {
         say(text + (reused ? " (done before)" : ""));
     }
 
+    /// Where dumps and images are until they are measured.
+    std::string scratch() const { return options_.folder + "/scratch"; }
+
     void runSampling(const SweepSampling& sampling, int seed) {
         const std::string command = samplingCommand(sampling, seed);
         const std::string key = samplingKey(command);
-        const std::string dump = options_.folder + "/work/" + key + ".exr";
+        const std::string dump = scratch() + "/" + key + ".exr";
 
         std::vector<Task> tasks;
         for (const SweepMethod* method : methodsFor(sampling)) {
@@ -421,7 +424,7 @@ class Runner {
 
     SweepRecord makeImage(const Task& task, const std::string& dump) {
         SweepRecord record = task.record;
-        const std::string image = options_.folder + "/work/" + record.key + ".image.exr";
+        const std::string image = scratch() + "/" + record.key + ".image.exr";
         if (record.command.find("{sigma}") != std::string::npos) {
             const double sigma =
                 bestSigma(colourOf(readImage(dump), dump), reference_->colour, options_.input);
@@ -545,7 +548,7 @@ class Runner {
             for (const auto& [x, y] :
                  inspectedPixels(errorImage(colour, stddev, reference_), options_.inspectedRegions))
                 command += " --inspect " + std::to_string(x) + "," + std::to_string(y);
-            const std::string output = options_.folder + "/work/" + record.key + ".exr";
+            const std::string output = scratch() + "/" + record.key + ".exr";
             const ProcessRun run = runCommand(
                 executable(filled(command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(output)}})));
             record.command = filled(command, {{"input", "samples.exr"}, {"output", "image.exr"}});

@@ -94,7 +94,7 @@ TEST(VlxCompareSweep, OfADumpThenAgainThenInterrupted) {
     const std::string report = contents(out + "/report.html");
     EXPECT_GT(report.size(), 50000u);
     EXPECT_NE(report.find("\"inspection\":"), std::string::npos);
-    EXPECT_FALSE(std::filesystem::exists(out + "/work"));
+    EXPECT_FALSE(std::filesystem::exists(out + "/scratch"));
 
     // Again: nothing is run.
     const std::string before = contents(out + "/results.jsonl");

@@ -458,7 +458,9 @@ TEST(Plan, FeaturesAreRecordedWhereTheyVary) {
     add(two, TestScene::matte({0.7f, 0.6f, 0.4f}));
     EXPECT_TRUE(planOf(two.finish()).features.albedo);
     TestScene shining = corner();
-    add(shining, TestScene::emitter(Rgb(1)));
+    Material glowing = TestScene::matte({0.7f, 0.6f, 0.5f});
+    glowing.emission = Rgb(1);
+    add(shining, glowing);
     EXPECT_TRUE(planOf(shining.finish()).features.albedo) << "emitters are white in the dump";
 
     TestScene sky;
