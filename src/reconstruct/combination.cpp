@@ -4,11 +4,13 @@
 #include <cmath>
 
 #include "stacking.h"
+#include "wide.h"
 
 namespace vlx {
 
 namespace {
 
+constexpr float kFeatureWidth2 = 0.01f;  // (a tenth of a feature's scale)^2
 constexpr double kMeanSignificance = 1;  // standard errors by which the plain mean must improve
 
 /// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
@@ -30,7 +32,7 @@ float Combination::estimate(int j, int half, int c, int x, int y) const {
 /// the candidates that their squares in units of it are no floats.
 double Combination::halfVariance(int x, int y) const {
     double variance = 0, level = 0;
-    const float n = data_.row(2 * radiance_ + 2, y)[x];
+    const float n = data_.row(planes_.count(), y)[x];
     for (int c = 0; c < 3; ++c) {
         variance += 2 * variances_.row(c, y)[x] / std::max(1.f, n) / 3;
         for (int j = 0; j <= candidates(); ++j)
@@ -53,12 +55,12 @@ void Combination::momentsRow(int y) {
         for (int c = 0; c < 3; ++c)
             for (int half = 0; half < 2; ++half) {
                 // What is predicted is the other half's mean; one's own may be missing (a single sample).
-                if (data_.row(2 * radiance_ + 1 - half, y)[x] == 0) continue;
+                if (data_.row(planes_.halfCount(1 - half), y)[x] == 0) continue;
                 const double base = estimate(0, half, c, x, y);
                 const double other = data_.row((1 - half) * radiance_ + c, y)[x] - base;
                 for (int j = 1; j <= m; ++j)
                     e[static_cast<std::size_t>(j)] = estimate(j, half, c, x, y) - base;
-                if (data_.row(2 * radiance_ + half, y)[x] == 0) e.back() = 0;
+                if (data_.row(planes_.halfCount(half), y)[x] == 0) e.back() = 0;
                 std::size_t at = 0;
                 for (int i = 1; i <= m; ++i)
                     for (int j = 1; j <= i; ++j)
@@ -115,9 +117,11 @@ std::int64_t Combination::combineRow(int y, float* out) const {
 
 bool Combination::store(int x, int y, const Eigen::VectorXd& weights, float* out) const {
     const int m = candidates();
-    const float nA = data_.row(2 * radiance_, y)[x], nB = data_.row(2 * radiance_ + 1, y)[x];
-    const float n = data_.row(2 * radiance_ + 2, y)[x];
-    const bool known = data_.row(2 * radiance_ + 3, y)[x] > 0;
+    const float nA = data_.row(planes_.countA(), y)[x], nB = data_.row(planes_.countB(), y)[x];
+    const float n = data_.row(planes_.count(), y)[x];
+    const bool exact = isExact(x, y);
+    const std::array<double, 3> shared = sharedVariance(weights, x, y);
+    const double gap = static_cast<double>(data_.row(planes_.gap(), y)[x]);
     for (int c = 0; c < radiance_; ++c) {
         const double mean =
             n > 0 ? (nA * data_.row(c, y)[x] + nB * data_.row(radiance_ + c, y)[x]) / (nA + nB) : 0;
@@ -133,43 +137,68 @@ bool Combination::store(int x, int y, const Eigen::VectorXd& weights, float* out
             value = coverage(value);
         else if (radiance_ == 3 + (alpha_ >= 0) && mean >= 0)
             value = std::max(0.0, value);
-        const double chosen = known ? mean : value;
+        const double chosen = exact ? mean : value;
         out[c] = static_cast<float>(mean + strength * (chosen - mean));
         if (c >= 3) continue;
-        // What neighbourhoods share (the noise of their common data), what they differ in, and what
-        // models differ in.
+        // The noise of the halves' common data is estimated twice, by what the halves differ in and by the
+        // kriging variance (within): half of each. What a model's own noise does not explain of its
+        // difference from the combination is error of one or the other.
         const double meanVariance = variances_.row(c, y)[x] / std::max(1.f, n);
-        double variance = sharedVariance(weights, c, x, y);
+        double variance = shared[static_cast<std::size_t>(c)] / 2;
+        if (gap > 0) variance += picture_.semivarianceAt(c, gap / scale_);
         for (int j = 0; j <= m; ++j) {
             const double share = j == 0 ? rest : weights[j - 1];
             const double within =
-                j == m ? meanVariance
-                       : estimates_[static_cast<std::size_t>(j)].row(2 * radiance_ + c, y)[x] / 2;
+                j == m ? meanVariance : estimates_[static_cast<std::size_t>(j)].row(2 * radiance_ + c, y)[x];
             const double d = both(j) - value;
-            variance += share * (within + d * d);
+            variance += share * std::max(within, d * d);
         }
         const double s = strength;
-        out[radiance_ + c] = static_cast<float>(known ? 0 : std::sqrt(s * variance + (1 - s) * meanVariance));
+        out[radiance_ + c] = static_cast<float>(exact ? 0 : std::sqrt(s * variance + (1 - s) * meanVariance));
     }
-    return known;
+    return exact;
 }
 
-/// Variance of the mean of the two halves' combinations, from their difference, over 5 x 5 pixels.
-double Combination::sharedVariance(const Eigen::VectorXd& weights, int c, int x, int y) const {
+/// Whether the dump states that the pixel, and every one that its error variance was pooled over, has none.
+bool Combination::isExact(int x, int y) const {
+    if (data_.row(planes_.stated(), y)[x] == 0) return false;
+    for (int c = 0; c < 3; ++c)
+        if (variances_.row(c, y)[x] > 0) return false;
+    return true;
+}
+
+/// How alike the features of two pixels are, 0 to 1.
+float Combination::likeness(int x, int y, int col, int row) const {
+    float d = 0;
+    for (int f = 0; f < featureCount_; ++f) {
+        const float apart = features_.row(f, row)[col] - features_.row(f, y)[x];
+        d += apart * apart / (kFeatureWidth2 + 2 * features_.row(featureCount_ + f, y)[x]);
+    }
+    return nearExp(d);
+}
+
+/// Variance of the mean of the two halves' combinations, from their difference, over 5 x 5 pixels of alike
+/// features.
+std::array<double, 3> Combination::sharedVariance(const Eigen::VectorXd& weights, int x, int y) const {
     constexpr int kReach = 2;
-    double sum = 0;
-    int count = 0;
+    std::array<double, 3> sums{};
+    double total = 0;
     for (int row = std::max(0, y - kReach); row <= std::min(height_ - 1, y + kReach); ++row)
         for (int col = std::max(0, x - kReach); col <= std::min(width_ - 1, x + kReach); ++col) {
-            const auto difference = [&](int j) {
-                return static_cast<double>(estimate(j, 0, c, col, row)) - estimate(j, 1, c, col, row);
-            };
-            double d = (1 - weights.sum()) * difference(0);
-            for (int j = 1; j <= candidates(); ++j) d += weights[j - 1] * difference(j);
-            sum += d * d / 4;
-            ++count;
+            const auto alike = static_cast<double>(likeness(x, y, col, row));
+            if (alike == 0) continue;
+            total += alike;
+            for (int c = 0; c < 3; ++c) {
+                const auto difference = [&](int j) {
+                    return static_cast<double>(estimate(j, 0, c, col, row)) - estimate(j, 1, c, col, row);
+                };
+                double d = (1 - weights.sum()) * difference(0);
+                for (int j = 1; j <= candidates(); ++j) d += weights[j - 1] * difference(j);
+                sums[static_cast<std::size_t>(c)] += alike * d * d / 4;
+            }
         }
-    return sum / count;
+    for (double& sum : sums) sum /= total;
+    return sums;
 }
 
 }  // namespace vlx

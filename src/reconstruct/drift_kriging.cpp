@@ -6,6 +6,7 @@
 
 #include "combination.h"
 #include "neighbourhoods.h"
+#include "picture_scale.h"
 #include "pixel_data.h"
 #include "pixel_statistics.h"
 #include "prefilter.h"
@@ -82,15 +83,16 @@ class Pipeline {
           readRows_(kReadRows / options.scale),
           radiance_(layout_.radiance),
           gathered_(width_, planes_.channels, kGatheredRows),
-          data_(width_, dataPlanes(radiance_), kDataRows),
-          squares_(width_, 4, kDataRows),
+          data_(width_, DataPlanes{radiance_}.channels(), kDataRows),
+          squares_(width_, kSquaresPlanes, kDataRows),
           features_(width_, 2 * layout_.features, kFeatureRows),
           variances_(width_, 3, kFeatureRows),
           moments_(width_, Combination::momentPlanes(static_cast<int>(models_.size())), kEstimateRows),
-          pixels_(layout_, planes_, width_, height_, options.fireflies == Fireflies::Robust, gathered_, data_,
-                  squares_),
-          combination_(radiance_, layout_.alpha, options.strength, width_, height_, data_, variances_,
-                       estimates_, moments_) {
+          picture_(measurePictureScale(dump, layout_)),
+          pixels_(dump, layout_, planes_, options.scale, width_, height_,
+                  options.fireflies == Fireflies::Robust, gathered_, data_, squares_),
+          combination_(radiance_, layout_.alpha, options.strength, options.scale, width_, height_, picture_,
+                       data_, features_, layout_.features, variances_, estimates_, moments_) {
         if (layout_.features + 5 > kMaxRandomDrift || radiance_ > kMaxRandomDrift)
             throw Error(dump.path(), "expected at most " + std::to_string(kMaxRandomDrift - 5) +
                                          " features and " + std::to_string(kMaxRandomDrift) +
@@ -132,7 +134,8 @@ class Pipeline {
         varianceRows_ = std::max(0, krigedRows_ - kTileMargin);
         featureRows_ = tileAbove(varianceRows_ - kVarianceReach);
         dataRows_ = std::max(0, featureRows_ - kTileMargin);
-        gatheredRows_ = std::max(0, dataRows_ - kHoleReach) / options_.scale * options_.scale;
+        gatheredRows_ =
+            std::max(0, dataRows_ - PixelData::reach(options_.scale)) / options_.scale * options_.scale;
     }
 
     /// Chooses how many rows are read at a time by options_.maxMemory and the fullest row of the dump.
@@ -180,13 +183,7 @@ class Pipeline {
             const int scale = options_.scale, first = gatheredRows_;
             const int sourceRows = std::min(readRows_, (height_ - first) / scale);
             const int rows = sourceRows * scale;
-            SampleBand band = dump_.read(dump_.header().data.y + first / scale, sourceRows, layout_.names);
-            if (scale > 1) {
-                const auto position = static_cast<std::size_t>(layout_.position);
-                band = rebin(band, scale, position, position + 1);
-            }
-            if (dump_.header().replicatesShare && layout_.replicate >= 0)
-                band = averageReplicates(band, static_cast<std::size_t>(layout_.replicate));
+            const SampleBand band = readRows(dump_, layout_, scale, first / scale, sourceRows);
             watch_.addTo(report_.seconds["read"]);
             std::vector<GatherCounts> counts(static_cast<std::size_t>(rows));
             const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;
@@ -215,8 +212,9 @@ class Pipeline {
     void limit(int until) {
         until = std::min(until, height_);
         if (dataRows_ >= until) return;
-        gather(until + kHoleReach);
+        gather(until + PixelData::reach(options_.scale));
         const int first = dataRows_;
+        pixels_.prepare(first, until);
         std::vector<LimitedRow> limited(static_cast<std::size_t>(until - first));
         parallelFor(first, until, [&](std::int64_t y) {
             limited[static_cast<std::size_t>(y - first)] = pixels_.fillRow(static_cast<int>(y));
@@ -225,6 +223,7 @@ class Pipeline {
             if (!own(y)) continue;
             const LimitedRow& of = limited[static_cast<std::size_t>(y - first)];
             report_.limitedSamples += of.samples;
+            report_.farPixels += of.farPixels;
             removed_ += of.luminance;
         }
         report_.energyRemoved = luminance_ > 0 ? removed_ / luminance_ : 0;
@@ -252,8 +251,8 @@ class Pipeline {
         prefilter(until + kVarianceReach);
         limit(until + kVarianceReach);
         parallelFor(varianceRows_, until, [&](std::int64_t y) {
-            smoothVariances(squares_, features_, layout_.features, static_cast<int>(y), width_, height_,
-                            variances_);
+            smoothVariances(squares_, data_, {radiance_}, features_, layout_.features, picture_,
+                            static_cast<int>(y), width_, height_, variances_);
         });
         varianceRows_ = until;
         watch_.addTo(report_.seconds["variances"]);
@@ -265,11 +264,8 @@ class Pipeline {
         while (krigedRows_ < until) {
             const int y = krigedRows_;
             smooth(y + kTile + kTileMargin);
-            TileInput input{&data_,           &features_,
-                            &variances_,      {radiance_, 0, radiance_, 2 * radiance_, 2 * radiance_ + 1},
-                            layout_.features, layout_.group,
-                            layout_.groups,   width_,
-                            height_};
+            TileInput input{&data_,           &squares_,     &features_,     &variances_, {radiance_},
+                            layout_.features, layout_.group, layout_.groups, width_,      height_};
             // Rows that this tile row is the first to reach.
             for (RowRing& ring : sums_)
                 for (int row = zeroedRows_; row < std::min(height_, y + kTile + kMaxReach); ++row)
@@ -312,9 +308,11 @@ class Pipeline {
 
     void finishRow(std::size_t m, int y) {
         const EstimatePlanes planes{radiance_};
-        const DataPlanes data{radiance_, 0, radiance_, 2 * radiance_, 2 * radiance_ + 1};
+        const DataPlanes data{radiance_};
         for (int x = 0; x < width_; ++x) {
-            double spread[3] = {};
+            double variance[3] = {};
+            double perSample = 1e-300;  // of noise, over colours
+            for (int c = 0; c < 3; ++c) perSample += static_cast<double>(variances_.row(c, y)[x]) / 3;
             for (int half = 0; half < 2; ++half) {
                 const int first = half * planes.perHalf();
                 // A half without data here takes the other's estimate.
@@ -322,16 +320,24 @@ class Pipeline {
                 if (sums_[m].row(first, y)[x] <= 0) from = planes.perHalf() - first;
                 const double weight = sums_[m].row(from, y)[x];
                 for (int c = 0; c < radiance_; ++c) {
-                    const double shift = weight > 0 ? sums_[m].row(from + planes.sum(c), y)[x] / weight : 0;
+                    if (weight <= 0) {  // no neighbourhood with data reaches it
+                        estimates_[m].row(half * radiance_ + c, y)[x] = data_.row(data.mean(half) + c, y)[x];
+                        if (c < 3) variance[c] += 2 * static_cast<double>(variances_.row(c, y)[x]);
+                        continue;
+                    }
+                    const double shift = sums_[m].row(from + planes.sum(c), y)[x] / weight;
                     estimates_[m].row(half * radiance_ + c, y)[x] =
                         static_cast<float>(reference(data_, data, c, x, y) + shift);
-                    if (c < 3 && weight > 0)
-                        spread[c] += std::max(
-                            0.0, sums_[m].row(from + planes.square(c), y)[x] / weight - shift * shift);
+                    if (c >= 3) continue;
+                    const double spread =
+                        std::max(0.0, sums_[m].row(from + planes.square(c), y)[x] / weight - shift * shift);
+                    const double kriging = sums_[m].row(from + planes.variance(), y)[x] / weight;
+                    const double own = kriging * static_cast<double>(variances_.row(c, y)[x]) / perSample;
+                    variance[c] += spread + std::max(0.0, own - spread) / 2;
                 }
             }
             for (int c = 0; c < 3; ++c)
-                estimates_[m].row(2 * radiance_ + c, y)[x] = static_cast<float>(spread[c] / 2);
+                estimates_[m].row(2 * radiance_ + c, y)[x] = static_cast<float>(variance[c] / 4);
         }
     }
 
@@ -385,6 +391,7 @@ class Pipeline {
     RowRing features_, variances_;
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: A, B, spread of R, G, B
     RowRing moments_;
+    PictureScale picture_;
     PixelData pixels_;
     Combination combination_;
     int firstRow_ = 0, endRow_ = 0;  // of the band

@@ -22,11 +22,13 @@ constexpr float kCoveringWeight = 0.2f;    // a pixel less like its regular cent
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
 constexpr float kFeatureWidth2 = 0.04f;    // (a fifth of a feature's scale)^2: as unlike as noise of one
 constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
-constexpr float kLeastCountRatio = 1e-3f;  // a pixel without samples: predicted, and next to no datum
+constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this many: no datum, but a place
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
 // than their prefilter says. Twice the standard deviation.
 constexpr double kFeatureErrorFactor = 4;
 constexpr float kLeastSquare = 1e-30f;  // of radiance, or of its noise
+constexpr double kWildVariances = 9;    // a feature beyond three standard deviations may be wild
+constexpr double kFew = 0.01;           // of the data: as many may be
 constexpr int kPriorIterations = 4;
 
 int lanesUp(int n) { return (n + 7) & ~7; }
@@ -74,9 +76,8 @@ VLX_WIDE void weightedGram(const float* x, const float* w, int rows, int stride,
         }
 }
 
-/// Weighted variance of n values, a multiple of 8 (the rest zero), whose weights add up to `total`.
-VLX_WIDE double weightedSpread(const float* x, const float* w, int n, double total) {
-    double sums[2];
+/// Sums of w x, w x^2 over n values, a multiple of 8 (the rest zero).
+VLX_WIDE void weightedSums(const float* x, const float* w, int n, double* sums) {
     Lanes first = {}, second = {};
     for (int i = 0; i < n; i += 8) {
         Lanes value, weight;
@@ -90,7 +91,23 @@ VLX_WIDE double weightedSpread(const float* x, const float* w, int n, double tot
         sums[0] += static_cast<double>(first[k]);
         sums[1] += static_cast<double>(second[k]);
     }
-    return (sums[1] - sums[0] * sums[0] / total) / total;
+}
+
+/// The largest (x - mean)^2 of n values, a multiple of 8, that have a weight.
+VLX_WIDE float farthest(const float* x, const float* w, int n, float mean) {
+    Lanes most = {};
+    const Lanes none = {};
+    for (int i = 0; i < n; i += 8) {
+        Lanes value, weight;
+        std::memcpy(&value, x + i, sizeof(Lanes));
+        std::memcpy(&weight, w + i, sizeof(Lanes));
+        const Lanes d = value - mean;
+        const Lanes square = weight > none ? d * d : none;
+        most = square > most ? square : most;
+    }
+    float largest = 0;
+    for (int k = 0; k < 8; ++k) largest = std::max(largest, most[k]);
+    return largest;
 }
 
 /// estimates[i] = offset + sum_j coefficient_j x_j,i
@@ -125,6 +142,9 @@ class Tile {
         y_ = y;
         reach_ = reach;
         const int c = input.planes.radiance;
+        own_.resize(planes(1));
+        freedom_.resize(planes(1));
+        copy(*input.squares, 3, freedom_.data());
         for (int half = 0; half < 2; ++half) {
             means_[half].resize(planes(c));
             counts_[half].resize(planes(1));
@@ -136,15 +156,18 @@ class Tile {
             guide.value.resize(planes(3));
             guide.variance.resize(planes(3));
             for (int k = 0; k < c; ++k)
-                copy(*input.data, (half == 0 ? input.planes.meanA : input.planes.meanB) + k,
-                     means_[half].data() + plane(k));
-            copy(*input.data, half == 0 ? input.planes.countA : input.planes.countB, counts_[half].data());
+                copy(*input.data, input.planes.mean(half) + k, means_[half].data() + plane(k));
+            copy(*input.data, input.planes.halfCount(half), counts_[half].data());
             std::copy_n(means_[half].data(), planes(3), guide.value.data());
             for (int k = 0; k < 3; ++k) {
                 copy(*input.variances, k, guide.variances(k));
+                copy(*input.squares, k, own_.data());
                 for (std::size_t i = 0; i < plane(1); ++i) {
-                    guide.variances(k)[i] /= std::max(1.f, counts_[half][i]);
-                    errors_[half][i] += guide.variances(k)[i] / 3;
+                    const float n = std::max(1.f, counts_[half][i]);
+                    errors_[half][i] += guide.variances(k)[i] / (3 * n);
+                    // Its own scatter can raise a pixel's variance, not lower it: an outlier counts as noisy.
+                    const float own = freedom_[i] >= 1 ? own_[i] / freedom_[i] : 0;
+                    guide.variances(k)[i] = std::max(guide.variances(k)[i], own) / n;
                 }
             }
         }
@@ -239,6 +262,7 @@ class Tile {
 
         index_.clear();
         weights_.clear();
+        predicted_.clear();
         const int most = 1 + kPositionFunctions + in_.featureCount + channels + kBlockRows;
         x_values_.resize(static_cast<std::size_t>(most * stride));
         float* const places = x_values_.data() + stride;
@@ -254,8 +278,10 @@ class Tile {
                 const float ratio = std::clamp(counts_[half][static_cast<std::size_t>(at)] / own,
                                                kLeastCountRatio, kMostCountRatio);
                 const std::size_t i = index_.size();
+                const bool datum = counts_[half][static_cast<std::size_t>(at)] > 0;
                 index_.push_back(at);
-                weights_.push_back(alike * ratio);
+                weights_.push_back(datum ? alike * ratio : 0.f);
+                predicted_.push_back(alike * ratio);
                 const float px = static_cast<float>(dx) * perReach, py = static_cast<float>(dy) * perReach;
                 float* p = places + i;
                 p[0] = px;
@@ -263,11 +289,12 @@ class Tile {
                 p[2 * stride] = px * px;
                 p[3 * stride] = py * py;
                 p[4 * stride] = px * py;
+                if (!datum) continue;
                 noise +=
                     static_cast<double>(alike * ratio) * errors_[half][static_cast<std::size_t>(at)] * ratio;
                 total += static_cast<double>(alike * ratio);
             }
-        if (index_.empty()) return;
+        if (total <= 0) return;
         ++counts.neighbourhoods;
         const auto n = static_cast<int>(index_.size());
         const int padded = lanesUp(n);
@@ -285,7 +312,7 @@ class Tile {
             float* x = constant + (1 + kPositionFunctions + static_cast<int>(varying_.size())) * stride;
             for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - about;
             std::fill(x + n, x + padded, 0.f);
-            if (weightedSpread(x, weights_.data(), padded, total) < kLeastFeatureSpread) continue;
+            if (forgetWild(x, n, padded, total) < kLeastFeatureSpread) continue;
             const float* errors = features_.data() + plane(in_.featureCount + f);
             double sum = 0;
             for (int i = 0; i < n; ++i) {
@@ -371,8 +398,15 @@ class Tile {
             return v * v;
         };
         for (int i = 0; i < n; ++i)
-            weights_[static_cast<std::size_t>(i)] *= perNoise * taper(places[i]) * taper(places[stride + i]);
-        scatter(weights_.data(), n, sums_.data() + plane(out.weight()));
+            predicted_[static_cast<std::size_t>(i)] *=
+                perNoise * taper(places[i]) * taper(places[stride + i]);
+        scatter(predicted_.data(), n, sums_.data() + plane(out.weight()));
+        // Kriging variance, on average over the data: the constant and each effective function cost one part
+        // in as many as there are.
+        const auto krigingVariance = static_cast<float>(variance * (1 + drift.effective) / total);
+        for (int i = 0; i < n; ++i)
+            sums_[plane(out.variance()) + static_cast<std::size_t>(index_[static_cast<std::size_t>(i)])] +=
+                predicted_[static_cast<std::size_t>(i)] * krigingVariance;
         estimates_.resize(static_cast<std::size_t>(4 * padded));
         float* const estimate = estimates_.data();
         float *const about = estimate + padded, *const sum = about + padded, *const square = sum + padded;
@@ -390,10 +424,46 @@ class Tile {
                        static_cast<float>(offset), estimate);
             const float* references = references_.data() + plane(c);
             for (int i = 0; i < n; ++i) about[i] = references[index_[static_cast<std::size_t>(i)]];
-            addEstimates(estimate, about, weights_.data(), n, sum, square);
+            addEstimates(estimate, about, predicted_.data(), n, sum, square);
             scatter(sum, n, sums_.data() + plane(out.sum(c)));
             if (c < 3) scatter(square, n, sums_.data() + plane(out.square(c)));
         }
+    }
+
+    /// Weighted variance of a feature, n values, once wild ones are forgotten: a few values that lie farther
+    /// from the range of all others than it is wide, and than a feature's unit, would fix its coefficient by
+    /// themselves. They count as not known: as the mean of the others.
+    double forgetWild(float* x, int n, int padded, double total) {
+        double sums[2];
+        weightedSums(x, weights_.data(), padded, sums);
+        double mean = sums[0] / total;
+        const double variance = (sums[1] - sums[0] * mean) / total;
+        const float far = farthest(x, weights_.data(), padded, static_cast<float>(mean));
+        if (far <= 1 || static_cast<double>(far) <= kWildVariances * variance) return variance;
+        sorted_.clear();
+        for (int i = 0; i < n; ++i)
+            if (weights_[static_cast<std::size_t>(i)] > 0) sorted_.push_back(x[i]);
+        const auto few = std::max<std::ptrdiff_t>(
+            1, static_cast<std::ptrdiff_t>(kFew * static_cast<double>(sorted_.size())));
+        if (static_cast<std::ptrdiff_t>(sorted_.size()) <= 2 * few) return variance;
+        std::nth_element(sorted_.begin(), sorted_.begin() + few, sorted_.end());
+        const float low = sorted_[static_cast<std::size_t>(few)];
+        std::nth_element(sorted_.begin(), sorted_.end() - 1 - few, sorted_.end());
+        const float high = *(sorted_.end() - 1 - few);
+        const float margin = std::max(1.f, high - low);
+        const auto wild = [&](int i) { return x[i] < low - margin || x[i] > high + margin; };
+        double known = 0, sum = 0;
+        for (int i = 0; i < n; ++i)
+            if (!wild(i)) {
+                known += static_cast<double>(weights_[static_cast<std::size_t>(i)]);
+                sum += static_cast<double>(weights_[static_cast<std::size_t>(i)] * x[i]);
+            }
+        if (!(known > 0)) return variance;
+        mean = sum / known;
+        for (int i = 0; i < n; ++i)
+            if (wild(i)) x[i] = static_cast<float>(mean);
+        weightedSums(x, weights_.data(), padded, sums);
+        return (sums[1] - sums[0] * sums[0] / total) / total;
     }
 
     void scatter(const float* values, int n, float* to) const {
@@ -413,11 +483,12 @@ class Tile {
     TileInput in_;
     int x_ = 0, y_ = 0, reach_ = 0;
     PatchTile guides_[2];
-    std::vector<float> means_[2], counts_[2], errors_[2], distances_[2], references_, features_, scratch_;
+    std::vector<float> own_, freedom_, means_[2], counts_[2], errors_[2], distances_[2], references_,
+        features_, scratch_;
 
     // Of the centre at work.
     std::vector<int> index_, varying_, used_, group_;
-    std::vector<float> weights_, x_values_, weighted_, estimates_, sums_;
+    std::vector<float> sorted_, weights_, predicted_, x_values_, weighted_, estimates_, sums_;
     std::vector<double> gram_;
 };
 

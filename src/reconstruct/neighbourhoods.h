@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "patch_similarity.h"
+#include "pixel_data.h"
 #include "row_ring.h"
 
 /// Kriging in overlapping neighbourhoods: the estimates of one tile's centres, added to the pixels they
@@ -18,32 +19,27 @@ struct NeighbourhoodModel {
     bool features = false;  ///< unlike features weigh a datum down as well
 };
 
-/// Planes of the data that neighbourhoods are made of.
-struct DataPlanes {
-    int radiance = 3;
-    int meanA = 0, meanB = 0;  ///< radiance channels each
-    int countA = 0, countB = 0;
-};
-
 /// Sums over neighbourhoods, of one model; planes of one half begin at half * perHalf().
 struct EstimatePlanes {
     int radiance = 3;
     int weight() const { return 0; }
     int sum(int channel) const { return 1 + channel; }              ///< of weight * (estimate - reference)
     int square(int colour) const { return 1 + radiance + colour; }  ///< of weight * (estimate - reference)^2
-    int perHalf() const { return 1 + radiance + 3; }
+    int variance() const { return 1 + radiance + 3; }               ///< of weight * kriging variance
+    int perHalf() const { return 1 + radiance + 4; }
     int channels() const { return 2 * perHalf(); }
 };
 
 /// A pixel's reference value, which sums are taken about so that little cancels: the smaller of its halves'
 /// means (a firefly is in one of them).
 inline float reference(const RowRing& data, const DataPlanes& planes, int channel, int x, int y) {
-    const float a = data.row(planes.meanA + channel, y)[x], b = data.row(planes.meanB + channel, y)[x];
+    const float a = data.row(planes.meanA() + channel, y)[x], b = data.row(planes.meanB() + channel, y)[x];
     return a < b ? a : b;
 }
 
 struct TileInput {
     const RowRing* data = nullptr;       ///< DataPlanes
+    const RowRing* squares = nullptr;    ///< kSquaresPlanes
     const RowRing* features = nullptr;   ///< f features, then their f error variances
     const RowRing* variances = nullptr;  ///< 3: variance of one sample of R, G, B
     DataPlanes planes;

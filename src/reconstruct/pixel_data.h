@@ -1,34 +1,55 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
+#include "gap_field.h"
 #include "pixel_statistics.h"
 #include "row_ring.h"
 
 /// From gathered statistics to the data that are kriged: means of the halves without fireflies, holes filled.
 namespace vlx {
 
-/// Pixels within which a pixel without samples looks for some; also covers what fireflies are compared with.
+/// Pixels within which a pixel without samples, or without those of a half, looks for some.
 inline constexpr int kHoleReach = 5;
 
-/// Planes of the data, r being the number of radiance channels: 0 means of half A, r means of half B, 2 r
-/// count of A, 2 r + 1 of B, 2 r + 2 of both, 2 r + 3 whether the pixel is exact.
-inline constexpr int dataPlanes(int radiance) { return 2 * radiance + 4; }
+/// Planes of the data.
+struct DataPlanes {
+    int radiance = 3;
+    int meanA() const { return 0; }  ///< radiance channels
+    int meanB() const { return radiance; }
+    int countA() const { return 2 * radiance; }  ///< samples: 0 where the mean is no datum
+    int countB() const { return 2 * radiance + 1; }
+    int count() const { return 2 * radiance + 2; }
+    int stated() const { return 2 * radiance + 3; }  ///< 1 where the dump states the error variance
+    int gap() const { return 2 * radiance + 4; }  ///< pixels to the nearest samples: 0 where there are some
+    int channels() const { return 2 * radiance + 5; }
 
-/// What was taken off the fireflies of a row.
+    int mean(int half) const { return half == 0 ? meanA() : meanB(); }
+    int halfCount(int half) const { return half == 0 ? countA() : countB(); }
+};
+
+/// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples.
+inline constexpr int kSquaresPlanes = 5;
+
+/// What was taken off the fireflies of a row, and what was filled in.
 struct LimitedRow {
     std::int64_t samples = 0;
     double luminance = 0;
+    std::int64_t farPixels = 0;  ///< without samples within kHoleReach
 };
 
 /// Refers to its rings. Rows may be filled at the same time.
 class PixelData {
   public:
-    /// `squares`: sums of squares of R, G, B; their degrees of freedom. `robust`: Fireflies::Robust.
-    PixelData(const SampleLayout& layout, const GatheredPlanes& planes, int width, int height, bool robust,
-              RowRing& gathered, RowRing& data, RowRing& squares)
-        : layout_(layout),
+    /// `scale`: pixels of the image along each axis for one of the dump; `robust`: Fireflies::Robust.
+    PixelData(const SampleSource& dump, const SampleLayout& layout, const GatheredPlanes& planes, int scale,
+              int width, int height, bool robust, RowRing& gathered, RowRing& data, RowRing& squares)
+        : dump_(dump),
+          layout_(layout),
           planes_(planes),
+          out_{layout.radiance},
+          scale_(scale),
           width_(width),
           height_(height),
           radiance_(layout.radiance),
@@ -37,22 +58,35 @@ class PixelData {
           data_(data),
           squares_(squares) {}
 
-    /// Fills row y of data and squares; rows kHoleReach around it are gathered.
+    /// Rows that must be gathered above and below the ones that are filled.
+    static int reach(int scale);
+
+    /// To be called before the rows [first, until) are filled: reads the dump once more if one of their
+    /// pixels has no samples within kHoleReach.
+    void prepare(int first, int until);
+    /// Fills row y of data and squares; rows reach() around it are gathered.
     LimitedRow fillRow(int y);
 
   private:
-    void fillHole(int x, int y);
-    void limitPixel(int x, int y, LimitedRow& limited);
-    bool isExact(int x, int y) const;
-    float halfMean(int count, int mean, int x, int y) const;
+    struct Place {
+        int x, y;  // x -1: none
+        float distance;
+    };
+    Place nearest(int count, int x, int y) const;
+    float fillHole(int x, int y, LimitedRow& row);
+    void limitPixel(int x, int y, LimitedRow& row);
+    float halfMean(int half, int c, int x, int y) const;
     float secondBrightest(int x, int y) const;
     void borrowSquares(int x, int y, float* squares, float& freedom) const;
 
+    const SampleSource& dump_;
     const SampleLayout& layout_;
     const GatheredPlanes& planes_;
-    int width_, height_, radiance_;
+    DataPlanes out_;
+    int scale_, width_, height_, radiance_;
     bool robust_;
     RowRing &gathered_, &data_, &squares_;
+    std::unique_ptr<GapField> far_;
 };
 
 }  // namespace vlx

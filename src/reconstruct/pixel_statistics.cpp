@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kScaleRows = 16;
 constexpr double kScalePercentile = 0.99;
+constexpr float kMedians = 4;  // of a feature's magnitude: its scale, at most
 
 void addFeatures(const DumpHeader& header, const std::vector<std::string>& channels, SampleLayout& layout) {
     for (const std::string& channel : channels)
@@ -67,10 +68,15 @@ void measureScales(const SampleSource& dump, SampleLayout& layout, std::size_t f
     for (std::size_t c = 0; c < measured; ++c) {
         std::vector<float>& values = magnitudes[c];
         if (values.empty()) continue;
-        const auto nth = values.begin() + static_cast<std::ptrdiff_t>(kScalePercentile *
-                                                                      static_cast<double>(values.size() - 1));
-        std::nth_element(values.begin(), nth, values.end());
-        if (*nth > 0) layout.scale[first + c] = *nth;
+        const auto percentile = [&](double share) {
+            const auto nth =
+                values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+            std::nth_element(values.begin(), nth, values.end());
+            return *nth;
+        };
+        const float most = percentile(kScalePercentile), median = percentile(0.5);
+        const float scale = median > 0 ? std::min(most, kMedians * median) : most;
+        if (scale > 0) layout.scale[first + c] = scale;
     }
 }
 
@@ -171,6 +177,7 @@ GatheredPlanes::GatheredPlanes(const SampleLayout& layout)
     meanB = take(radiance);
     squares = take(3);
     freedom = take(1);
+    stated = take(1);
     feature = take(features);
     featureError = take(features);
     brightest = take(radiance);
@@ -178,6 +185,11 @@ GatheredPlanes::GatheredPlanes(const SampleLayout& layout)
     secondLuminance = take(1);
     brightestHalf = take(1);
     channels = next;
+}
+
+float saturated(float value) {
+    const float magnitude = std::abs(value);
+    return magnitude > 1 ? std::copysign(1 + std::log(magnitude), value) : value;
 }
 
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
@@ -189,6 +201,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
     const std::size_t alpha = layout.alpha < 0 ? radiance + features : static_cast<std::size_t>(layout.alpha);
     std::vector<std::size_t> taken, halves[2];
     std::vector<std::pair<std::uint64_t, std::size_t>> order;
+    int singles = y;  // pixels of one sample so far, the first of them in half A or B by turns
     for (int x = 0; x < band.width; ++x) {
         const std::size_t pixel = static_cast<std::size_t>(bandRow) * static_cast<std::size_t>(band.width) +
                                   static_cast<std::size_t>(x);
@@ -215,8 +228,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
             std::sort(order.begin(), order.end());
             halves[0].clear();
             halves[1].clear();
-            // Single samples go to the halves by turns, as the fields of a chessboard do.
-            const std::size_t startHalf = taken.size() == 1 ? static_cast<std::size_t>(x + y) % 2 : 0;
+            const std::size_t startHalf = taken.size() == 1 ? static_cast<std::size_t>(singles++) % 2 : 0;
             for (std::size_t i = 0; i < order.size(); ++i)
                 halves[(startHalf + i) % 2].push_back(order[i].second);
         }
@@ -230,8 +242,9 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         float most = -1, second = -1;
         int brightHalf = 0;
         const auto value = [&](std::size_t c, std::size_t s) {
-            const auto v = static_cast<double>(band.values[c][s]);
-            return std::isfinite(v) ? v : 0.0;
+            const float v = band.values[c][s];
+            if (!std::isfinite(v)) return 0.0;
+            return static_cast<double>(c < radiance ? v : saturated(v / layout.scale[c - radiance]));
         };
         for (std::size_t c = 0; c < radiance + features; ++c)
             first[c] = taken.empty() ? 0 : value(c, taken[0]);
@@ -266,6 +279,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         put(planes.count, n);
         put(planes.countA, nA);
         put(planes.countB, nB);
+        put(planes.stated, known);
         put(planes.freedom, known ? std::max(1.0, n - 1) : std::max(0.0, n - 1));
         for (std::size_t c = 0; c < radiance; ++c) {
             const double a = nA > 0 ? first[c] + sum[0][c] / nA : 0;
@@ -278,10 +292,9 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
             if (c < 3 && known) squares = knownSquares(band, layout, taken, c);
             if (c < 3) put(planes.squares + static_cast<int>(c), squares);
             if (c < radiance) continue;
-            const double scale = layout.scale[c - radiance];
             const int f = static_cast<int>(c - radiance);
-            put(planes.feature + f, n > 0 ? (first[c] + total / n) / scale : 0);
-            put(planes.featureError + f, n > 1 ? squares / (n * (n - 1)) / (scale * scale) : 0);
+            put(planes.feature + f, n > 0 ? first[c] + total / n : 0);
+            put(planes.featureError + f, n > 1 ? squares / (n * (n - 1)) : 0);
         }
         for (std::size_t c = 0; c < radiance; ++c)
             put(planes.brightest + static_cast<int>(c), taken.empty() ? 0 : value(c, bright));

@@ -31,9 +31,10 @@ struct SampleLayout {
 std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options);
 
 /// Finds the roles. Albedo and normals are of order 1 by definition; the scale of depth and of named features
-/// is the 99th percentile of their magnitude in 16 rows spread over the image (the same rows whatever band of
-/// the image is reconstructed). Features that are constant in these rows stay: they cost little. Throws Error
-/// when a named channel is missing or is R, G or B.
+/// is the 99th percentile of their magnitude, at most 4 medians (a background's depth has no bounds), in 16
+/// rows spread over the image (the same rows whatever band of the image is reconstructed). Features that are
+/// constant in these rows stay: they cost little. Throws Error when a named channel is missing or is R, G or
+/// B.
 SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOptions& options);
 
 /// Planes of the statistics of rows of pixels, as gathered.
@@ -47,11 +48,16 @@ struct GatheredPlanes {
     int meanA, meanB;           ///< radiance channels: mean of each half (0 where it has no sample)
     int squares;                ///< 3: sum of squared deviations of R, G, B from the pixel's mean
     int freedom;                ///< degrees of freedom of `squares`
+    int stated;                 ///< 1 where the dump states the error variances of all samples, else 0
     int feature, featureError;  ///< mean of each feature, and the error variance of that mean
     int brightest;              ///< radiance channels of the brightest sample
     int brightestLuminance, secondLuminance, brightestHalf;
     int channels;
 };
+
+/// What a feature's value counts as, in units of its scale: itself up to 1, and beyond that 1 + ln |x|. A
+/// lamp's albedo of 100 or a sky at depth 1e10 is unlike all else, no more.
+float saturated(float value);
 
 struct GatherCounts {
     std::int64_t samples = 0, dropped = 0, empty = 0;
@@ -63,11 +69,12 @@ struct GatherCounts {
 ///
 /// Halves A and B are the replicates of even and odd number where the dump has replicates, else a random half
 /// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
-/// alike, and may lie on different sides of the pixel. A single sample belongs to A or B as its pixel is a
-/// black or a white field of a chessboard. Samples with known error variances (kVarianceChannels) stand for
-/// their own scatter. A sample with radiance that is not finite is dropped; other such values count as 0.
-/// Sums run in double precision about the pixel's first sample. A `clamp` above 0 limits the luminance of
-/// each sample.
+/// alike, and may lie on different sides of the pixel. Single samples belong to A and B by turns along a row,
+/// starting with A or B by turns from row to row: a chessboard where every pixel has one. Samples with known
+/// error variances (kVarianceChannels) stand for their own scatter. A sample with radiance that is not finite
+/// is dropped; other such values count as 0. Features are saturated(feature / scale), sample by sample. Sums
+/// run in double precision about the pixel's first sample. A `clamp` above 0 limits the luminance of each
+/// sample.
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
                        int bandRow, double clamp, RowRing& ring, int y);
 

@@ -1,6 +1,7 @@
 #include "prefilter.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "wide.h"
 
@@ -8,8 +9,9 @@ namespace vlx {
 
 namespace {
 
-constexpr float kFeatureFloor = 1e-4f;   // differences of a hundredth of a feature's scale are none
-constexpr float kFeatureWidth2 = 0.01f;  // (a tenth of a feature's scale)^2
+constexpr float kFeatureFloor = 1e-4f;     // differences of a hundredth of a feature's scale are none
+constexpr double kAgreement = 1.0 / 1024;  // of radiance: half floats cannot tell such values apart
+constexpr float kFeatureWidth2 = 0.01f;    // (a tenth of a feature's scale)^2
 
 /// weights[i] = nearExp(max(0, d[i])), summed into `total`, and into sums of each value and variance.
 VLX_WIDE void accumulate(const float* __restrict distances, int count, const float* const* values,
@@ -46,7 +48,7 @@ VLX_WIDE void addWeighted(const float* const* there, const float* const* here, c
         }
     }
     for (int i = first; i < last; ++i) weights[i] = nearExp(weights[i]);
-    for (int c = 0; c < 4; ++c) {
+    for (int c = 0; c < kSquaresPlanes; ++c) {
         const float* __restrict q = squares[c];
         float* __restrict s = sums[c];
         for (int i = first; i < last; ++i) s[i] += weights[i] * q[i + dx];
@@ -124,10 +126,11 @@ void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, cons
     }
 }
 
-void smoothVariances(const RowRing& squares, const RowRing& features, int featureCount, int y, int width,
+void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
+                     const RowRing& features, int featureCount, const PictureScale& picture, int y, int width,
                      int height, RowRing& variances) {
     const auto count = static_cast<std::size_t>(featureCount), w = static_cast<std::size_t>(width);
-    std::vector<float> scales(count * w), sums(4 * w), weights(w);
+    std::vector<float> scales(count * w), sums(kSquaresPlanes * w), weights(w);
     std::vector<const float*> here(count), there(count), scale(count);
     for (std::size_t f = 0; f < count; ++f) {
         here[f] = features.row(static_cast<int>(f), y);
@@ -135,20 +138,33 @@ void smoothVariances(const RowRing& squares, const RowRing& features, int featur
         for (std::size_t i = 0; i < w; ++i) scales[f * w + i] = 1 / (kFeatureWidth2 + 2 * errors[i]);
         scale[f] = scales.data() + f * w;
     }
-    float* out[4];
-    for (std::size_t c = 0; c < 4; ++c) out[c] = sums.data() + c * w;
+    float* out[kSquaresPlanes];
+    for (std::size_t c = 0; c < kSquaresPlanes; ++c) out[c] = sums.data() + c * w;
     for (int row = std::max(0, y - kVarianceReach); row <= std::min(height - 1, y + kVarianceReach); ++row) {
         for (std::size_t f = 0; f < count; ++f) there[f] = features.row(static_cast<int>(f), row);
-        const float* in[4];
-        for (int c = 0; c < 4; ++c) in[c] = squares.row(c, row);
+        const float* in[kSquaresPlanes];
+        for (int c = 0; c < kSquaresPlanes; ++c) in[c] = squares.row(c, row);
         for (int dx = -kVarianceReach; dx <= kVarianceReach; ++dx)
             addWeighted(there.data(), here.data(), scale.data(), featureCount, in, std::max(0, -dx),
                         std::min(width, width - dx), dx, weights.data(), out);
     }
     for (int c = 0; c < 3; ++c) {
         float* result = variances.row(c, y);
-        for (std::size_t i = 0; i < w; ++i)
-            result[i] = out[3][i] > 0 ? out[static_cast<std::size_t>(c)][i] / out[3][i] : 0;
+        for (std::size_t i = 0; i < w; ++i) {
+            double variance = picture.variance[c];
+            if (out[3][i] > 0) {
+                variance = static_cast<double>(out[c][i] / out[3][i]);
+                const auto mean = [&](int half) {
+                    return std::abs(static_cast<double>(data.row(planes.mean(half) + c, y)[i]));
+                };
+                const double level = std::max(mean(0), mean(1));
+                const bool stated = data.row(planes.stated(), y)[i] > 0;
+                if (!stated && variance <= kAgreement * kAgreement * level * level)
+                    variance = std::max(variance, unseenVariance(static_cast<double>(out[4][i]),
+                                                                 std::max(level, picture.level)));
+            }
+            result[i] = static_cast<float>(variance);
+        }
     }
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include "patch_similarity.h"
+#include "picture_scale.h"
+#include "pixel_data.h"
 #include "pixel_statistics.h"
 #include "row_ring.h"
 
@@ -18,10 +20,14 @@ void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, cons
                        int x, int y, int width, int height, RowRing& features);
 
 /// Variance of one sample of R, G, B for the pixels of row y: sum w S / sum w (n - 1) over the pixels within
-/// kVarianceReach, S their sums of squares and n their counts (planes 0 to 2 and 3 of `squares`),
+/// kVarianceReach, S their sums of squares and n their counts (`squares`: kSquaresPlanes),
 ///     w = exp(-sum over features of df^2 / (0.1^2 + 2 v)),   v the pixel's own feature error variance.
-/// Writes planes 0 to 2.
-void smoothVariances(const RowRing& squares, const RowRing& features, int featureCount, int y, int width,
+/// Where they agree (within the rounding of half floats) and the dump does not state so, unseenVariance() of
+/// their sum w n samples and of the pixel's own mean or the picture's, whichever is larger; where no pixel
+/// has two samples or a neighbour to compare it with, the picture's. Writes planes 0 to 2: above 0 but where
+/// the dump states 0.
+void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
+                     const RowRing& features, int featureCount, const PictureScale& picture, int y, int width,
                      int height, RowRing& variances);
 
 }  // namespace vlx

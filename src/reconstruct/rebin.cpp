@@ -64,4 +64,15 @@ SampleBand averageReplicates(const SampleBand& band, std::size_t replicateChanne
     return means;
 }
 
+SampleBand readRows(const SampleSource& dump, const SampleLayout& layout, int scale, int y, int rows) {
+    SampleBand band = dump.read(dump.header().data.y + y, rows, layout.names);
+    if (scale > 1) {
+        const auto position = static_cast<std::size_t>(layout.position);
+        band = rebin(band, scale, position, position + 1);
+    }
+    if (dump.header().replicatesShare && layout.replicate >= 0)
+        band = averageReplicates(band, static_cast<std::size_t>(layout.replicate));
+    return band;
+}
+
 }  // namespace vlx

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "pixel_statistics.h"
 #include "variolux/dump/band.h"
 
 namespace vlx {
@@ -15,5 +16,10 @@ SampleBand rebin(const SampleBand& band, int scale, std::size_t xChannel, std::s
 /// (DumpHeader::replicatesShare), so that what is left is independent. A value that is not finite makes the
 /// mean so.
 SampleBand averageReplicates(const SampleBand& band, std::size_t replicateChannel);
+
+/// Samples of `rows` rows from row y (counted from the dump's top) as statistics are gathered from them: the
+/// layout's channels, in parts of pixels where scale is above 1, each replicate's mean where replicates
+/// share.
+SampleBand readRows(const SampleSource& dump, const SampleLayout& layout, int scale, int y, int rows);
 
 }  // namespace vlx

@@ -25,6 +25,7 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
         {"limitedSamples", report.limitedSamples},
         {"energyRemoved", report.energyRemoved},
         {"emptyPixels", report.emptyPixels},
+        {"farPixels", report.farPixels},
         {"exactPixels", report.exactPixels},
         {"regions", regions},
         {"jitteredSystems", report.jitteredSystems},
@@ -136,6 +137,7 @@ std::string toText(const ReconstructionReport& report) {
     text << report.samples << " samples";
     if (report.droppedSamples > 0) text << ", " << report.droppedSamples << " dropped (non-finite)";
     if (report.emptyPixels > 0) text << ", " << report.emptyPixels << " pixels without samples";
+    if (report.farPixels > 0) text << " (" << report.farPixels << " of them more than 5 pixels from any)";
     text << "\n";
     bool first = true;
     for (int i = 0; i < kRegionOutcomes; ++i) {
@@ -145,7 +147,7 @@ std::string toText(const ReconstructionReport& report) {
         first = false;
     }
     if (!first) text << "\n";
-    if (report.limitedSamples > 0)
+    if (report.limitedSamples > 0 || report.neighbourhoods > 0)
         text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
              << " % of the light removed\n";
     if (report.neighbourhoods > 0)

@@ -51,7 +51,8 @@ struct ReconstructionReport {
     std::int64_t droppedSamples = 0;                      ///< non-finite radiance: left out
     std::int64_t emptyPixels = 0;                         ///< pixels without a usable sample of their own
     std::int64_t jitteredSystems = 0;                     ///< kriging systems that needed jitter
-    std::int64_t exactPixels = 0;                         ///< all samples agree: their value, without error
+    std::int64_t farPixels = 0;                           ///< of them, with none within 5 pixels either
+    std::int64_t exactPixels = 0;                         ///< the dump states an error of 0: kept as they are
     std::int64_t limitedSamples = 0;                      ///< made darker by the firefly estimator
     double energyRemoved = 0;               ///< share of all samples' luminance that this took away
     std::int64_t neighbourhoods = 0;        ///< kriged (default method), over models and halves
