@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -244,7 +245,9 @@ vlx::Reconstruction reconstruct(const Options& o, const vlx::SampleSource& dump,
         case Method::Gaussian:
             break;
     }
-    vlx::Reconstruction result = vlx::reconstructMean(dump, progress);
+    // A pixel without samples has no part in its neighbours.
+    vlx::Reconstruction result =
+        vlx::reconstructMean(dump, progress, std::numeric_limits<float>::quiet_NaN());
     // The error of a filtered pixel is mostly bias, which this filter cannot know: no stddev layer.
     const vlx::Image radiance = channelsOf(
         result.image, [](const std::string& name) { return name == "R" || name == "G" || name == "B"; });

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "bands.h"
+#include "picture_scale.h"
 #include "variolux/base/parallel.h"
 
 namespace vlx {
@@ -31,12 +32,13 @@ Eigen::VectorXd borrowedVariance(const SampleBand& band, const BandLayout& layou
 
 }  // namespace
 
-Reconstruction reconstructMean(const SampleSource& dump, const Progress& progress) {
+Reconstruction reconstructMean(const SampleSource& dump, const Progress& progress, float emptyValue) {
     ChannelChoice channels = chooseChannels(dump.header());
     channels.names.resize(channels.layout.radiance.size());  // positions are not needed
     channels.layout.x = channels.layout.y = -1;
     const int radiance = channels.radianceCount();
 
+    const PictureScale picture = measurePictureScale(dump);
     Reconstruction result;
     result.image = makeOutputImage(dump.header(), channels);
     std::atomic<std::int64_t> dropped = 0, empty = 0;
@@ -46,17 +48,22 @@ Reconstruction reconstructMean(const SampleSource& dump, const Progress& progres
             for (int column = band.x; column < band.x + band.width; ++column) {
                 const RegionData pixel = gatherRegion(band, channels.layout, Window{column, row, 1, 1}, 1);
                 dropped += pixel.dropped;
+                float* out = result.image.at(column - result.image.data.x, row - result.image.data.y);
                 if (pixel.samples == 0) {
                     ++empty;
+                    std::fill_n(out, radiance, emptyValue);
+                    for (int c = 0; c < 3; ++c)
+                        out[radiance + c] = static_cast<float>(picture.unknownDeviation(c));
                     continue;
                 }
                 const Eigen::VectorXd variance =
                     pixel.varianceKnown ? Eigen::VectorXd(pixel.errorVariances.row(0) * pixel.counts[0])
                                         : borrowedVariance(band, channels.layout, column, row);
-                float* out = result.image.at(column - result.image.data.x, row - result.image.data.y);
                 for (int c = 0; c < radiance; ++c) out[c] = static_cast<float>(pixel.means(0, c));
                 for (int c = 0; c < 3; ++c)
-                    out[radiance + c] = static_cast<float>(std::sqrt(variance[c] / pixel.counts[0]));
+                    out[radiance + c] = static_cast<float>(
+                        variance[c] > 0 ? std::sqrt(variance[c] / pixel.counts[0])
+                                        : picture.agreedDeviation(pixel.means(0, c), pixel.counts[0]));
             }
         });
     });

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "bands.h"
+#include "picture_scale.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
 #include "variolux/geostat/covariance_system.h"
@@ -210,6 +211,18 @@ void store(const RegionEstimate& estimate, int radiance, Image& image) {
     }
 }
 
+/// Nothing is certain: where all samples agree, others may not; a region without samples may be anything.
+void doubt(const PictureScale& picture, RegionEstimate& estimate) {
+    const RegionDiagnostics& of = estimate.diagnostics;
+    for (int c = 0; c < kColours; ++c)
+        for (Eigen::Index p = 0; p < estimate.stddev.rows(); ++p)
+            if (estimate.stddev(p, c) == 0)
+                estimate.stddev(p, c) =
+                    of.outcome == RegionOutcome::Empty
+                        ? picture.unknownDeviation(c)
+                        : picture.agreedDeviation(estimate.values(p, c), static_cast<double>(of.samples));
+}
+
 /// Pixels of a region without a usable sample.
 std::int64_t emptyPixels(const RegionData& data) {
     std::vector<bool> filled(static_cast<std::size_t>(data.pixels.pixels()));
@@ -319,6 +332,7 @@ Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& op
     const ChannelChoice channels = chooseChannels(header);
     const int radiance = channels.radianceCount();
     const bool whole = options.regionSize == 0;
+    const PictureScale picture = measurePictureScale(dump);
 
     Reconstruction result;
     result.image = makeOutputImage(header, channels);
@@ -340,6 +354,7 @@ Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& op
                             [&](const auto& p) { return regions[index].contains(p.first, p.second); });
             RegionEstimate estimate = krigeRegion(data, options, inspect);
             if (inspect) inspections[index] = std::move(estimate.inspection);
+            doubt(picture, estimate);
             store(estimate, radiance, result.image);
             diagnostics[index] = estimate.diagnostics;
             dropped[index] = data.dropped;

@@ -86,6 +86,14 @@ class Sums {
 
 }  // namespace
 
+double PictureScale::agreedDeviation(double value, double samples) const {
+    return std::sqrt(unseenVariance(samples, std::max(std::abs(value), level)) / std::max(1.0, samples));
+}
+
+double PictureScale::unknownDeviation(int c) const {
+    return std::sqrt(level * level + semivariance[c].back());
+}
+
 double PictureScale::semivarianceAt(int c, double pixels) const {
     const std::vector<double>& values = semivariance[c];
     const double place = std::log2(std::max(1.0, pixels));
@@ -93,6 +101,10 @@ double PictureScale::semivarianceAt(int c, double pixels) const {
     const auto above = std::min(values.size() - 1, below + 1);
     const double share = std::min(1.0, place - static_cast<double>(below));
     return (1 - share) * values[below] + share * values[above];
+}
+
+PictureScale measurePictureScale(const SampleSource& dump) {
+    return measurePictureScale(dump, chooseSampleLayout(dump, {.standardFeatures = false}));
 }
 
 PictureScale measurePictureScale(const SampleSource& dump, const SampleLayout& layout) {

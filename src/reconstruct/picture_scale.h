@@ -22,6 +22,11 @@ struct PictureScale {
     /// pixels have but one sample. The last is the field's spread.
     std::vector<double> semivariance[3];
 
+    /// Standard deviation of the mean of `samples` samples that all have the same value.
+    double agreedDeviation(double value, double samples) const;
+    /// Standard deviation of colour c about 0: of a pixel that no sample says anything of.
+    double unknownDeviation(int c) const;
+
     /// Semivariance of colour c at a distance of some pixels, linear in its logarithm between lags.
     double semivarianceAt(int c, double pixels) const;
 };
@@ -33,5 +38,7 @@ inline double unseenVariance(double samples, double level) {
 }
 
 PictureScale measurePictureScale(const SampleSource& dump, const SampleLayout& layout);
+/// The same for methods that know no features.
+PictureScale measurePictureScale(const SampleSource& dump);
 
 }  // namespace vlx

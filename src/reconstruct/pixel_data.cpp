@@ -100,7 +100,8 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
     for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares + c);
 
     const float brightest = raw(planes_.brightestLuminance);
-    if (robust_ && brightest > 0) {
+    const bool exact = raw(planes_.stated) > 0 && squares[0] + squares[1] + squares[2] == 0;
+    if (robust_ && brightest > 0 && !exact) {
         const float most = secondBrightest(x, y);
         if (brightest > most) {
             const float change = most / brightest - 1;  // of every radiance channel of that sample

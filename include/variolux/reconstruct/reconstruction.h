@@ -18,10 +18,10 @@ enum class RegionOutcome {
     Kriged,       ///< a variogram was fitted and the system solved
     NoStructure,  ///< the fitted sill is zero: kriging is then the weighted mean of the region's data
     TooFewData,   ///< fewer than 3 data: their mean
-    AllEqual,     ///< all data equal in every channel: that value, without error
+    AllEqual,     ///< all data equal in every channel: that value, its error what they may not have seen
     FitFailed,    ///< no variogram could be fitted: the mean
     SolveFailed,  ///< the kriging system could not be solved even with the solver's fallbacks: the mean
-    Empty,        ///< no usable sample at all: zero, and counted
+    Empty,        ///< no usable sample at all: zero, with the picture's spread as its error, and counted
 };
 inline constexpr int kRegionOutcomes = 7;
 

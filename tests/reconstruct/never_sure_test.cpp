@@ -1,0 +1,353 @@
+// What samples do not say: pictures with rare light, gaps, halves without data, wild features. Each test is a
+// fault that once gave a wrong picture, sure of itself.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+
+#include "gap_field.h"
+#include "picture_scale.h"
+#include "variolux/dump/sample_buffer.h"
+#include "variolux/reconstruct/drift_kriging.h"
+#include "variolux/reconstruct/mean.h"
+#include "variolux/reconstruct/paper.h"
+
+namespace vlx {
+namespace {
+
+using Random = std::mt19937;
+/// Appends one sample (a value for each channel) of the pixel at (x, y), or none.
+using Sampler = std::function<void(int x, int y, Random&, std::vector<std::vector<float>>& samples)>;
+
+SampleBuffer picture(int size, const std::vector<std::string>& channels, unsigned seed,
+                     const Sampler& sampler) {
+    DumpHeader header;
+    header.data = header.display = {0, 0, size, size};
+    for (const std::string& channel : channels) header.channels.push_back({channel, ChannelType::Float});
+    SampleBand band{0, 0, size, size, {0}, channels, std::vector<std::vector<float>>(channels.size())};
+    Random random(seed);
+    std::vector<std::vector<float>> samples;
+    for (int y = 0; y < size; ++y)
+        for (int x = 0; x < size; ++x) {
+            samples.clear();
+            sampler(x, y, random, samples);
+            for (const std::vector<float>& sample : samples)
+                for (std::size_t c = 0; c < channels.size(); ++c) band.values[c].push_back(sample[c]);
+            band.offsets.push_back(band.values[0].size());
+        }
+    return SampleBuffer(header, band, "picture");
+}
+
+/// Grey pictures: 0.5 with noise, `spp` samples where `there`.
+SampleBuffer greyWith(
+    int size, int spp, const std::function<bool(int, int)>& there,
+    const std::function<double(int, int)>& truth = [](int, int) { return 0.5; }) {
+    return picture(size, {"R", "G", "B"}, 7, [&](int x, int y, Random& random, auto& samples) {
+        std::normal_distribution<float> noise(0, 0.05f);
+        for (int s = 0; s < spp && there(x, y); ++s) {
+            const auto z = static_cast<float>(truth(x, y));
+            samples.push_back({z + noise(random), z + noise(random), z + noise(random)});
+        }
+    });
+}
+
+/// Light of mean `p`: each sample is 1 with probability p, else 0; the features are constant in every pixel.
+SampleBuffer rareLight(int spp, double p, unsigned seed) {
+    return picture(48, {"R", "G", "B", "albedo.R", "albedo.G", "albedo.B"}, seed,
+                   [&](int x, int, Random& random, auto& samples) {
+                       std::bernoulli_distribution hit(p);
+                       const float albedo = x < 24 ? 0.3f : 0.3f + 0.01f * static_cast<float>(x - 24);
+                       for (int s = 0; s < spp; ++s) {
+                           const float z = hit(random) ? 1.f : 0.f;
+                           samples.push_back({z, z, z, albedo, albedo, albedo});
+                       }
+                   });
+}
+
+float deviation(const Image& image, int x, int y, int colour = 0) {
+    return image.at(x, y)[image.channel("stddev.R") + colour];
+}
+
+double least(const Image& image, const std::string& channel) {
+    double value = std::numeric_limits<double>::max();
+    for (int y = 0; y < image.data.height; ++y)
+        for (int x = 0; x < image.data.width; ++x)
+            value = std::min(value, static_cast<double>(image.at(x, y)[image.channel(channel)]));
+    return value;
+}
+
+TEST(NeverSure, RareLightIsKeptAndCovered) {
+#ifdef VARIOLUX_SANITIZED
+    GTEST_SKIP() << "statistics of minutes; the code is the other tests'";
+#endif
+    for (const auto& [spp, p] : {std::pair{4, 0.05}, {8, 0.05}, {16, 0.05}, {8, 0.02}, {4, 0.2}}) {
+        double sum = 0, one = 0;
+        constexpr int kSeeds = 3;
+        for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+            const Image image =
+                reconstructDriftKriging(rareLight(spp, p, seed), {.fireflies = Fireflies::Keep}).image;
+            EXPECT_GT(least(image, "stddev.R"), 0) << spp << " " << p;
+            for (int y = 0; y < 48; ++y)
+                for (int x = 0; x < 48; ++x) {
+                    const auto z = static_cast<double>(image.at(x, y)[0]);
+                    sum += z;
+                    one += std::abs(z - p) < static_cast<double>(deviation(image, x, y));
+                }
+        }
+        const double pixels = kSeeds * 48 * 48;
+        // The samples' own mean has a standard deviation of sqrt(p (1 - p) / n): 3 of them, and 4 %.
+        const double scatter = 3 * std::sqrt(p * (1 - p) / (pixels * spp));
+        EXPECT_NEAR(sum / pixels, p, scatter + 0.04 * p) << spp << " " << p;
+        EXPECT_GT(one / pixels, 0.5) << spp << " " << p;
+        EXPECT_LT(one / pixels, 0.93) << spp << " " << p;
+    }
+}
+
+TEST(NeverSure, AgreementOfFewSamplesIsNoKnowledge) {
+    const SampleBuffer dump = rareLight(4, 0.01, 1);  // 96 % of the pixels are black
+    for (const Image& image : {reconstructDriftKriging(dump, {}).image, reconstructPaper(dump, {}).image,
+                               reconstructMean(dump).image})
+        for (const char* channel : {"stddev.R", "stddev.G", "stddev.B"}) EXPECT_GT(least(image, channel), 0);
+}
+
+TEST(NeverSure, ABlackPictureMayHaveMissedLight) {
+    const SampleBuffer dump = picture(20, {"R", "G", "B"}, 1, [](int, int, Random&, auto& samples) {
+        samples.push_back({0, 0, 0});
+    });
+    for (const Image& image : {reconstructDriftKriging(dump, {}).image, reconstructPaper(dump, {}).image,
+                               reconstructMean(dump).image}) {
+        EXPECT_EQ(image.at(10, 10)[0], 0);
+        EXPECT_GT(least(image, "stddev.R"), 0);
+    }
+}
+
+// Hundreds of samples around that all agree: sharp, with an error that is small.
+TEST(NeverSure, NoiseFreeAreasStaySharp) {
+    const auto truth = [](int x, int y) { return x < 30 ? 0.5 + 0.3 * ((x / 4 + y / 4) % 2) : 1.0; };
+    const SampleBuffer dump =
+        picture(60, {"R", "G", "B"}, 3, [&](int x, int y, Random& random, auto& samples) {
+            std::normal_distribution<float> noise(0, x < 30 ? 0.f : 0.5f);
+            for (int s = 0; s < 8; ++s) {
+                const float z = static_cast<float>(truth(x, y)) * (1 + noise(random));
+                samples.push_back({z, z, z});
+            }
+        });
+    const Reconstruction result = reconstructDriftKriging(dump, {});
+    EXPECT_EQ(result.report.exactPixels, 0);
+    double squares = 0;
+    for (int y = 0; y < 60; ++y)
+        for (int x = 0; x < 20; ++x) {
+            const double d = static_cast<double>(result.image.at(x, y)[0]) - truth(x, y);
+            squares += d * d / (20 * 60);
+            EXPECT_GT(deviation(result.image, x, y), 0);
+            EXPECT_LT(deviation(result.image, x, y), 0.05);
+        }
+    EXPECT_LT(std::sqrt(squares), 0.01);
+}
+
+TEST(NeverSure, OnlyAStatedErrorOfZeroIsExact) {
+    const auto flat = [](float variance) {
+        return picture(30, {"R", "G", "B", "variance.R", "variance.G", "variance.B"}, 3,
+                       [=](int x, int, Random& random, auto& samples) {
+                           std::normal_distribution<float> noise(0, 0.1f);
+                           const float z = 0.5f + noise(random), v = x < 15 ? 0 : variance;
+                           samples.push_back({z, z, z, v, v, v});
+                       });
+    };
+    const SampleBuffer exact = flat(0);
+    const Reconstruction kept = reconstructDriftKriging(exact, {.fireflies = Fireflies::Keep});
+    EXPECT_EQ(kept.report.exactPixels, 900);
+    EXPECT_EQ(kept.image.at(7, 7)[0], reconstructMean(exact).image.at(7, 7)[0]);
+    EXPECT_EQ(deviation(kept.image, 7, 7), 0);
+    // Beside pixels that are not, it is an estimate from few samples like any other.
+    const Image beside = reconstructDriftKriging(flat(0.01f), {}).image;
+    EXPECT_EQ(deviation(beside, 5, 5), 0);
+    EXPECT_GT(deviation(beside, 14, 5), 0);
+}
+
+TEST(NeverSure, AHalfWithoutSamplesIsNotBlack) {
+    const std::pair<const char*, std::function<bool(int, int)>> patterns[] = {
+        {"columns", [](int x, int) { return x % 2 == 0; }},
+        {"rows", [](int, int y) { return y % 2 == 0; }},
+        {"chess", [](int x, int y) { return (x + y) % 2 == 0; }},
+        {"quarter", [](int x, int y) { return x % 2 == 0 && y % 2 == 0; }},
+        {"one", [](int x, int y) { return x != 12 || y != 12; }}};
+    for (const auto& [name, there] : patterns)
+        for (const int spp : {1, 2, 4}) {
+            const Reconstruction result =
+                reconstructDriftKriging(greyWith(24, spp, there), {.fireflies = Fireflies::Keep});
+            for (int y = 0; y < 24; ++y)
+                for (int x = 0; x < 24; ++x) {
+                    const double error = static_cast<double>(result.image.at(x, y)[0]) - 0.5;
+                    EXPECT_LT(std::abs(error), 3 * static_cast<double>(deviation(result.image, x, y)) + 0.02)
+                        << name << " " << spp << " at " << x << " " << y;
+                }
+            EXPECT_EQ(result.report.farPixels, 0);
+        }
+}
+
+TEST(NeverSure, WideGapsArePredictedWithAnErrorThatGrows) {
+    const auto wave = [](int x, int y) { return 1 + 0.5 * std::sin(0.15 * x) * std::cos(0.12 * y); };
+    for (const int hole : {10, 14, 20, 40}) {
+        const int begin = (64 - hole) / 2;
+        const auto there = [=](int x, int y) {
+            return x < begin || y < begin || x >= begin + hole || y >= begin + hole;
+        };
+        const Reconstruction flat = reconstructDriftKriging(greyWith(64, 4, there), {});
+        const Reconstruction waves = reconstructDriftKriging(greyWith(64, 4, there, wave), {});
+        EXPECT_EQ(flat.report.emptyPixels, hole * hole);
+        EXPECT_EQ(flat.report.farPixels > 0, hole > 10) << hole;
+        for (int y = 0; y < 64; ++y)
+            for (int x = 0; x < 64; ++x) {
+                EXPECT_NEAR(flat.image.at(x, y)[0], 0.5, 3 * deviation(flat.image, x, y) + 0.02) << hole;
+                EXPECT_NEAR(waves.image.at(x, y)[0], wave(x, y), 3.5 * deviation(waves.image, x, y) + 0.04)
+                    << hole << " at " << x << " " << y;
+            }
+        EXPECT_GT(deviation(waves.image, 32, 32), 1.5f * deviation(waves.image, begin, 32)) << hole;
+        EXPECT_GT(deviation(waves.image, 32, 32), 5 * deviation(waves.image, 5, 5)) << hole;
+        // Cut anywhere, the gap is filled the same.
+        const Image band = reconstructDriftKriging(greyWith(64, 4, there, wave), {.band = {1, 2}}).image;
+        EXPECT_TRUE(std::equal(band.pixels.begin(), band.pixels.end(), waves.image.at(0, 32)));
+    }
+}
+
+TEST(NeverSure, APictureWithoutSamplesKnowsNothing) {
+    const Image image = reconstructDriftKriging(greyWith(20, 0, [](int, int) { return false; }), {}).image;
+    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+    EXPECT_GE(least(image, "stddev.R"), 1);
+}
+
+TEST(NeverSure, WithoutASecondSampleThereIsNoFirefly) {
+    for (const double share : {0.02, 0.05, 0.1}) {
+        Random random(9);
+        std::bernoulli_distribution there(share);
+        const Reconstruction result =
+            reconstructDriftKriging(greyWith(48, 1, [&](int, int) { return there(random); }), {});
+        EXPECT_LE(result.report.limitedSamples, 2) << share;
+        EXPECT_LT(result.report.energyRemoved, 0.01) << share;
+    }
+}
+
+TEST(NeverSure, SubPixelsWithoutSamplesAreNotBlack) {
+    for (const auto& [spp, scale] : {std::pair{1, 2}, {2, 2}, {4, 4}}) {
+        const SampleBuffer dump = picture(24, {"R", "G", "B", "A", "sample.x", "sample.y"}, 5,
+                                          [&](int x, int y, Random& random, auto& samples) {
+                                              std::uniform_real_distribution<float> at(0, 1);
+                                              for (int s = 0; s < spp; ++s)
+                                                  samples.push_back({0.4f + 0.2f * at(random), 0.5f, 0.5f,
+                                                                     1.f, static_cast<float>(x) + at(random),
+                                                                     static_cast<float>(y) + at(random)});
+                                          });
+        const Image image = reconstructDriftKriging(dump, {.scale = scale}).image;
+        EXPECT_GT(least(image, "A"), 0.98) << spp << " " << scale;
+        EXPECT_GT(least(image, "G"), 0.49) << spp << " " << scale;
+    }
+}
+
+/// Root mean square error of R of a noisy picture that a chequered feature guides; at `wild` pixels the
+/// feature has the value `value`.
+double errorWith(const char* feature, float value, const std::function<bool(int, int)>& wild) {
+    const auto truth = [](int x, int y) { return 0.2f + 0.6f * static_cast<float>((x / 3 + y / 3) % 2); };
+    std::vector<std::string> channels{"R", "G", "B"};
+    if (std::string(feature) == "albedo")
+        channels.insert(channels.end(), {"albedo.R", "albedo.G", "albedo.B"});
+    else
+        channels.emplace_back(feature);
+    const SampleBuffer dump = picture(48, channels, 5, [&](int x, int y, Random& random, auto& samples) {
+        std::normal_distribution<float> noise(0, 0.1f);
+        for (int s = 0; s < 4; ++s) {
+            samples.push_back({});
+            for (int c = 0; c < 3; ++c) samples.back().push_back(truth(x, y) + noise(random));
+            samples.back().resize(channels.size(), wild(x, y) ? value : truth(x, y));
+        }
+    });
+    const Image image = reconstructDriftKriging(dump, {}).image;
+    double squares = 0;
+    int count = 0;
+    for (int y = 0; y < 48; ++y)
+        for (int x = 0; x < 48; ++x) {
+            if (wild(x, y)) continue;
+            const double d = static_cast<double>(image.at(x, y)[0] - truth(x, y));
+            squares += d * d;
+            ++count;
+        }
+    return std::sqrt(squares / count);
+}
+
+TEST(NeverSure, AWildFeatureValueCostsItsPixelOnly) {
+    const auto one = [](int x, int y) { return x == 16 && y == 16; };
+    const auto two = [](int x, int y) { return (x == 16 || x == 30) && y == 20; };
+    for (const char* feature : {"albedo", "Z"}) {
+        const double tame = errorWith(feature, 0.4f, one);
+        for (const float value : {2.f, 8.f, 100.f, -50.f, 1e10f}) {
+            EXPECT_LT(errorWith(feature, value, one), 1.5 * tame) << feature << " " << value;
+            EXPECT_LT(errorWith(feature, value, two), 2 * tame) << feature << " " << value;
+        }
+    }
+}
+
+// A background at an unlimited depth is no reason to forget what depth says elsewhere.
+TEST(NeverSure, AFarBackgroundLeavesDepthItsUse) {
+    const auto sky = [](int, int y) { return y < 14; };
+    const double near = errorWith("Z", 1.5f, sky);
+    for (const float depth : {100.f, 65504.f, 1e10f})
+        EXPECT_LT(errorWith("Z", depth, sky), 1.5 * near) << depth;
+}
+
+TEST(PictureScale, NoiseCancelsInSemivariances) {
+    // Columns of independent levels: the semivariance is their variance at every lag.
+    Random levels(4);
+    std::normal_distribution<double> level(2, 0.5);
+    std::vector<double> columns;
+    double mean = 0, square = 0;
+    for (int i = 0; i < 512; ++i) {
+        columns.push_back(level(levels));
+        mean += columns.back() / 512;
+        square += columns.back() * columns.back() / 512;
+    }
+    const SampleBuffer dump =
+        picture(512, {"R", "G", "B"}, 6, [&](int x, int y, Random& random, auto& samples) {
+            if (y % 32 != 16) return;  // of the 16 rows that are read
+            std::normal_distribution<float> noise(0, 1);
+            for (int s = 0; s < 4; ++s) {
+                const auto z = static_cast<float>(columns[static_cast<std::size_t>(x)]);
+                samples.push_back({z + noise(random), z, 0});
+            }
+        });
+    const PictureScale scale = measurePictureScale(dump);
+    EXPECT_NEAR(scale.level, mean, 0.02);
+    // 16 rows of 512 x 4 samples: 1 % of the variance, three times.
+    EXPECT_NEAR(scale.variance[0], 1, 0.03);
+    EXPECT_DOUBLE_EQ(scale.variance[1], unseenVariance(16 * 512 * 4, scale.level));
+    const double variance = square - mean * mean;
+    EXPECT_NEAR(scale.semivarianceAt(0, 1), variance, 0.15 * variance);
+    EXPECT_NEAR(scale.semivarianceAt(1, 3), variance, 0.15 * variance);
+    EXPECT_EQ(scale.semivarianceAt(2, 3), 0);
+    EXPECT_GE(scale.semivarianceAt(0, 500), scale.semivarianceAt(0, 3));
+}
+
+TEST(GapField, IsSmoothAndKnowsHowFarAwaySamplesAre) {
+    const auto ramp = [](int x, int y) { return 1 + 0.01 * x + 0.02 * y; };
+    const SampleBuffer dump = greyWith(
+        96, 16, [](int x, int y) { return x < 24 || x >= 72 || y < 24 || y >= 72; }, ramp);
+    const SampleLayout layout = chooseSampleLayout(dump, {});
+    const GapField field(dump, layout, GatheredPlanes(layout));
+    std::vector<float> values, next;
+    EXPECT_NEAR(field.at(8, 8, values), 4, 1e-6);
+    EXPECT_NEAR(values[0], ramp(8, 8), 0.02);
+    const double middle = field.at(48, 48, values);
+    EXPECT_GT(middle, 8);
+    EXPECT_LT(middle, 48);
+    EXPECT_NEAR(values[0], ramp(48, 48), 0.15);
+    for (int x = 0; x < 95; ++x) {
+        field.at(x + 0.5, 48.5, values);
+        field.at(x + 1.5, 48.5, next);
+        EXPECT_LT(std::abs(next[0] - values[0]), 0.08) << x;
+    }
+}
+
+}  // namespace
+}  // namespace vlx
