@@ -145,8 +145,8 @@ TEST(References, OfAnyKindAreCheckedEverywhere) {
         "/animations/0/samplers/0/output"};
     j["buffers"] = json::parse(g.text())["buffers"];
     for (const std::string& place : places)
-        for (const json& bad : {json(-1), json(-7), json(99u), json("0"), json(0.5), json(true), json(nullptr),
-                                json::array(), json(18446744073709551615u)}) {
+        for (const json& bad : {json(-1), json(-7), json(99u), json("0"), json(0.5), json(true),
+                                json(nullptr), json::array(), json(18446744073709551615u)}) {
             json changed = j;
             const json::json_pointer pointer(place);
             ASSERT_TRUE(changed.contains(pointer)) << place;
