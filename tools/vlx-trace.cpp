@@ -68,7 +68,9 @@ struct TraceCommand {
             "every sample with position, albedo, normal and depth. vlx-krige reconstructs it.");
         app.add_option("SCENE", scene, "A glTF 2.0 scene, .glb or .gltf")->required();
         app.add_option("-o,--output", dump, "The dump to write (.exr)");
-        app.add_option("--camera", camera, "Name or number of the camera (default: the scene's active one)")
+        app.add_option("--camera", camera,
+                       "Name or number of the camera (default: the scene's active one, or the\n"
+                       "first that can be used)")
             ->type_name("NAME|INDEX");
         app.add_flag("--list-cameras", listCameras, "Print the scene's cameras and exit");
         app.add_option("--width", width, "Of the picture, in pixels (default: 512, or from the height)")
@@ -243,8 +245,8 @@ struct TraceCommand {
             options.inputs = hash.emplace(inputs()).text(options.band);
             if (!overwrite && vlx::isFinished({dump}, options.inputs)) return skip();
         }
+        if (listCameras) return printCameras(loadCameras(scene, exposure));
         Scene loaded = loadScene(scene, environment, exposure);
-        if (listCameras) return printCameras(loaded);
         options.camera = chosenCamera(loaded);
         std::optional<EarlierDump> earlier;
         if (!earlierPath.empty()) takeSizeOf(earlier.emplace(earlierPath));
@@ -307,9 +309,11 @@ struct TraceCommand {
     void note(const std::string& text) const { vlx::say(scene + ": " + text); }
 
     int printCameras(const Scene& loaded) const {
+        for (const std::string& warning : loaded.report.warnings) note("warning: " + warning);
         for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
             const Camera& c = loaded.cameras[i];
-            std::cout << i << "  " << c.name << (i == loaded.activeCamera ? "  (active)" : "")
+            std::cout << i << "  " << c.name
+                      << (i == loaded.activeCamera && c.unusable.empty() ? "  (active)" : "")
                       << (c.unusable.empty() ? "" : "  unusable: " + c.unusable) << "\n";
         }
         return vlx::kDone;
@@ -367,7 +371,17 @@ struct TraceCommand {
     }
 
     std::size_t chosenCamera(const Scene& loaded) const {
-        if (camera.empty()) return loaded.activeCamera;
+        if (camera.empty()) {
+            const auto named = [&](std::size_t i) {
+                const std::string& name = loaded.cameras[i].name;
+                return "camera " + std::to_string(i) + (name.empty() ? "" : " '" + name + "'");
+            };
+            if (loaded.activeCamera != loaded.wantedCamera)
+                note("warning: " + named(loaded.wantedCamera) +
+                     " cannot be used: " + loaded.cameras[loaded.wantedCamera].unusable + "; " +
+                     named(loaded.activeCamera) + " is taken (--camera takes another)");
+            return loaded.activeCamera;
+        }
         for (std::size_t i = 0; i < loaded.cameras.size(); ++i)
             if (loaded.cameras[i].name == camera) return i;
         const bool isNumber =
@@ -413,9 +427,15 @@ struct TraceCommand {
 
     void setSize(const Camera& chosen) {
         const double aspect = chosen.aspect > 0 ? static_cast<double>(chosen.aspect) : 1.0;
-        const auto rounded = [](double v) { return std::max(1, static_cast<int>(std::lround(v))); };
-        if (width == 0) width = height == 0 ? 512 : rounded(height * aspect);
-        if (height == 0) height = rounded(width / aspect);
+        const auto derived = [&](double side, const char* option) {
+            if (!(side < (1 << 20) + 0.5))
+                throw vlx::Error(scene, "the camera's aspectRatio of " + std::to_string(aspect) + " makes " +
+                                            std::to_string(side) + " pixels, expected at most 2^20: give " +
+                                            option);
+            return std::max(1, static_cast<int>(std::lround(side)));
+        };
+        if (width == 0) width = height == 0 ? 512 : derived(height * aspect, "--width");
+        if (height == 0) height = derived(width / aspect, "--height");
         options.width = width;
         options.height = height;
     }

@@ -24,13 +24,10 @@ struct Side {
         : point(seen),
           frame(seen.shadingNormal),
           wo(frame.toLocal(viewer)),
-          bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, seen.fromBehind, scene.albedoTables[0]) {}
+          bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, seen.fromBehind, scene.albedoTables[0],
+               frame.toLocal(seen.geometricNormal)) {}
 
     BsdfValue evaluate(const Vec3& direction) const { return bsdf.evaluate(frame.toLocal(direction)); }
-    /// Whether light may come from there at all.
-    bool lets(const Vec3& direction) const {
-        return consistent<kEveryFeature>(point, direction, dot(frame.normal, direction));
-    }
 
     SurfacePoint point;
     Frame frame;
@@ -40,8 +37,7 @@ struct Side {
 
 /// The receiver of direct light: the same whatever direction it is seen from on one side.
 Receiver receiverAt(const SurfacePoint& point) {
-    return {point.position, point.fromBehind ? -point.frontNormal : point.frontNormal,
-            point.material->transmissive()};
+    return {point.position, point.geometricNormal, point.material->transmissive()};
 }
 
 }  // namespace
@@ -68,7 +64,7 @@ struct BidirectionalTracer::Vertex {
     }
     /// Light that arrives from `direction` at a distance, of what starts there.
     Rgb arriving(const Vec3& direction, float distance) const {
-        const Material* through = dot(side.frame.normal, direction) < 0 ? beyond : medium;
+        const Material* through = dot(side.point.geometricNormal, direction) < 0 ? beyond : medium;
         return through != nullptr ? transmitted(through->absorption, distance) : Rgb(1);
     }
     /// Turns densities per solid angle at the vertex before into densities per area here.
@@ -201,15 +197,15 @@ std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const
         const BsdfSample next = vertex.side.bsdf.sample(u, choice.x);
         if (next.delta ? isBlack(next.weight) : !(next.pdf > 0)) break;
         if (delta && events == 1 && next.delta) break;  // what no path of PathTracer's finds
+        if (next.folded) break;                         // nor this
         const Vec3 direction = normalized(vertex.side.frame.toWorld(next.wi));
         const Side seen = vertex.from(scene_, direction);
-        if (!seen.lets(vertex.back)) break;
         Rgb scattered;
         if (next.delta) {
             scattered = next.weight;
             if (!next.coat) scattered *= seen.bsdf.beneath() / vertex.side.bsdf.beneath();
             // Light is squeezed into a smaller solid angle where importance, carried as L / n^2, is not.
-            if (next.wi.z < 0) {
+            if (next.through) {
                 const float ior = point.fromBehind ? 1 / surface.ior : surface.ior;
                 scattered *= std::abs(vertex.side.wo.z / next.wi.z) / (ior * ior);
             }
@@ -232,7 +228,7 @@ std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const
             if (choice.y >= survival) break;
             throughput *= 1 / survival;
         }
-        if (next.wi.z < 0) medium = vertex.beyond;
+        if (next.through) medium = vertex.beyond;
         ray = leave(point, direction, time);
         way = 0;
         ++events;
@@ -244,7 +240,7 @@ BidirectionalTracer::Found BidirectionalTracer::directLight(const Vertex& eye,
                                                             const LightSampler::Local& local, float choice,
                                                             Vec2 u, float time, std::uint32_t seed) const {
     const LightSample light = lights_.sample(local, choice, u);
-    if (!(light.pdf > 0) || isBlack(light.radiance) || !eye.side.lets(light.direction)) return {};
+    if (!(light.pdf > 0) || isBlack(light.radiance)) return {};
     const BsdfValue f = eye.side.evaluate(light.direction);
     if (isBlack(f.value)) return {};
     if (accelerator_.occluded(leave(eye.side.point, light.direction, time), light.distance, seed)) return {};
@@ -268,11 +264,9 @@ BidirectionalTracer::Found BidirectionalTracer::connection(const Vertex& eye, co
     if (!(d2 > 0)) return {};
     const float distance = std::sqrt(d2);
     const Vec3 direction = to / distance;
-    if (!eye.side.lets(direction)) return {};
     const BsdfValue f = eye.side.evaluate(direction);
     if (isBlack(f.value)) return {};
     const Side seen = light.from(scene_, -direction);
-    if (!seen.lets(light.back)) return {};
     const BsdfValue g = seen.evaluate(light.back);
     if (isBlack(g.value)) return {};
     if (accelerator_.occluded(leave(eye.side.point, direction, time), distance * kReach, seed)) return {};
@@ -301,7 +295,6 @@ void BidirectionalTracer::splat(const Vertex& light, Vec2 lens, float time, std:
     const float distance = std::sqrt(d2);
     const Vec3 direction = to / distance;
     const Side side = light.from(scene_, direction);
-    if (!side.lets(light.back)) return;
     const BsdfValue f = side.evaluate(light.back);
     if (isBlack(f.value)) return;
     if (accelerator_.occluded({seen.origin, -direction, time}, distance * kReach, seed)) return;
@@ -437,10 +430,9 @@ PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, c
         const BsdfSample next = bsdf.sample(pairs[dimension::kDirection], choice.x);
         if (isBlack(next.weight)) break;
         const Vec3 direction = normalized(eye.side.frame.toWorld(next.wi));
-        if (!eye.side.lets(direction)) break;
         if (next.delta) {
             vcm = 0;
-            vc = eye.vc * mis(eye.cosine(direction));
+            vc = next.folded ? 0 : eye.vc * mis(eye.cosine(direction));  // light subpaths do not fold
         } else {
             const double reverse = eye.from(scene_, direction).evaluate(eye.back).pdf;
             vc = mis(eye.cosine(direction) / static_cast<double>(next.pdf)) *
@@ -449,7 +441,7 @@ PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, c
         }
         throughput *= next.weight;
         lightsSampled = lightsSampled && !next.delta;
-        if (next.wi.z < 0) medium = eye.beyond;
+        if (next.through) medium = eye.beyond;
         if (bounce >= kSureBounces) {
             const float survival = std::min(1.f, maxComponent(throughput));
             if (choice.y >= survival) break;

@@ -38,11 +38,14 @@ struct BsdfValue {
 };
 
 struct BsdfSample {
-    Vec3 wi;             ///< local
-    Rgb weight;          ///< f |cos wi| / pdf; 0: the path ends here
-    float pdf = 0;       ///< of all lobes together; meaningless for delta lobes
-    bool delta = false;  ///< perfectly smooth reflection or refraction
-    bool coat = false;   ///< a delta lobe's: the clear coat, not what lies beneath
+    Vec3 wi;               ///< local
+    Rgb weight;            ///< f |cos wi| / pdf; 0: the path ends here
+    float pdf = 0;         ///< of all lobes together; meaningless for delta lobes
+    bool delta = false;    ///< perfectly smooth reflection or refraction
+    bool coat = false;     ///< a delta lobe's: the clear coat, not what lies beneath
+    bool through = false;  ///< wi lies beyond the true surface
+    /// A delta lobe's: folded back. Light that comes from wi does not go to wo.
+    bool folded = false;
 };
 
 /// Scattering at a point of a glTF surface, in the local frame whose z axis is the shading normal on the
@@ -67,7 +70,16 @@ struct BsdfSample {
 ///   index of the medium, which refraction leaves as it is; emission is given in it too.
 /// - coat: GGX of index 1.5, Ec its albedo times the clearcoat factor. Scaling by the view direction only
 ///   keeps energy for every base, at the price of reciprocity: f(wo, wi) has wo towards the camera.
-/// - sheen: Charlie's distribution (sheen.h), Es its albedo times the greatest channel of its colour.
+/// - sheen: Charlie's distribution (sheen.h), Es its albedo times the greatest channel of its colour; where
+///   its albedo is above 1, at grazing angles, it is scaled to 1.
+///
+/// Where the shading normal is not the true one, lobes about it reach through the surface. What a reflection
+/// would send beneath it, or refraction above it, leaves at the mirror image about the true surface, as if it
+/// met that next: f(wo, wi) + f(wo, image of wi). Energy is kept, and nothing jumps as normals tilt: where
+/// the shading normal turns from the viewer, a mirror reflects about the true normal. (Schuessler et al.,
+/// "Microfacet-based normal mapping for robust Monte Carlo path tracing", 2017, have a second facet reflect
+/// it likewise.) Diffuse light is too wide for that, it would shine twice where lights set; it is divided by
+/// the part of its lobe that is above the surface.
 ///
 /// `F`: what the surface may have. Parts that F lacks are not compiled.
 template <Features F>
@@ -77,8 +89,9 @@ class BasicBsdf {
   public:
     /// `fromInside`: wo is on the back of the surface (matters to glass only).
     /// `coatTable`: of index 1.5.
-    BasicBsdf(const SurfaceParameters& surface, const Vec3& wo, bool fromInside,
-              const AlbedoTable& coatTable);
+    /// `trueNormal`: the triangle's, local, on wo's side: trueNormal.z >= 0.
+    BasicBsdf(const SurfaceParameters& surface, const Vec3& wo, bool fromInside, const AlbedoTable& coatTable,
+              const Vec3& trueNormal = {0, 0, 1});
 
     BsdfValue evaluate(const Vec3& wi) const;
     /// `direction` chooses within the lobe, `choice` the lobe.
@@ -97,6 +110,10 @@ class BasicBsdf {
 
     struct Microfacet;
 
+    template <bool kImage>
+    BsdfValue lobes(const Vec3& wi) const;
+    Vec3 imageOf(const Vec3& wi) const { return wi - up_ * (2 * dot(wi, up_)); }
+
     Rgb baseFresnel(float cosH) const;
     float coatFresnel(float cosH) const;
     BsdfValue baseReflection(const Vec3& wi) const;
@@ -105,6 +122,7 @@ class BasicBsdf {
     BsdfValue glass(const Vec3& wi) const;
     BsdfValue sheen(const Vec3& wi) const;
     void leaveOut(const EffectSet& effects);
+    void leaveAbove();
     void setReflecting(const SurfaceParameters& s, bool fromInside, float glass, float sheenEnergy);
     Rgb dielectricAlbedo(const Albedo& a) const;
     struct GlassSplit {
@@ -116,9 +134,11 @@ class BasicBsdf {
     BsdfSample mirror(const Rgb& weight, bool coat) const;
     BsdfSample sampleMicrofacet(float alpha, Vec2 u) const;
     BsdfSample sampleGlass(Vec2 u, float choice) const;
-    BsdfSample finish(const Vec3& wi) const;
+    BsdfSample finish(Vec3 wi, bool through) const;
+    BsdfSample settled(BsdfSample delta) const;
 
     Vec3 wo_;
+    Vec3 up_;  ///< the true normal
     float alpha_;
     float coatAlpha_;
     float lambdaO_ = 0;      ///< of the base's GGX at wo
@@ -169,11 +189,13 @@ inline Rgb multipleColour(const Rgb& meanReflectance, float meanWhole) {
 
 /// 1 / (1 - x), bounded: where x is 1 the lobe it scales is 0.
 inline float inverseRest(float x) { return 1 / std::max(1 - x, 1e-4f); }
+inline Rgb inverseRest(const Rgb& c) { return {inverseRest(c.x), inverseRest(c.y), inverseRest(c.z)}; }
 
 template <Features F>
 BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromInside,
-                        const AlbedoTable& coatTable)
+                        const AlbedoTable& coatTable, const Vec3& trueNormal)
     : wo_(wo),
+      up_(trueNormal),
       alpha_(square(s.roughness)),
       coatAlpha_(square(s.clearcoatRoughness)),
       smooth_(alpha_ < kSmoothAlpha),
@@ -198,8 +220,9 @@ BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromIns
     if (F.layers && !isBlack(s.sheenColour)) {
         countEffect(Effect::Sheen);
         sheenRoughness_ = s.sheenRoughness;
-        sheen_ = s.sheenColour * base_;
-        sheenEnergy = maxComponent(sheen_) * s.sheenTable->albedo(cosO, sheenRoughness_);
+        const float albedo = s.sheenTable->albedo(cosO, sheenRoughness_);
+        sheen_ = s.sheenColour * (base_ / std::max(1.f, albedo));
+        sheenEnergy = maxComponent(sheen_) * albedo;
         base_ -= sheenEnergy;
     }
     if constexpr (F.reflection)
@@ -217,6 +240,8 @@ BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromIns
     }
     if constexpr (F.rare)
         if (!s.leftOut.none()) leaveOut(s.leftOut);
+    constexpr float kUpright = 0.9999f;  // closer, and less than 1e-4 of a lobe is beneath
+    if (up_.z < kUpright) leaveAbove();
     if constexpr (!F.reflection) {
         if (probability_[kDiffuse] > 0) probability_[kDiffuse] = 1;  // alone
     } else {
@@ -245,11 +270,9 @@ void BasicBsdf<F>::setReflecting(const SurfaceParameters& s, bool fromInside, fl
     const Rgb again = (multipleColour(metalMean, mean.whole) * metal_ + dielectricMultiple_ * opaque_) *
                       ((1 - atO.whole) * base_);
     multiple_ = again * inverseRest(mean.whole);
-
     const Rgb entering = Rgb(1) - dielectricAlbedo(atO);
     const Rgb meanDielectric = dielectricAlbedo(mean);
-    const Rgb rest{inverseRest(meanDielectric.x), inverseRest(meanDielectric.y),
-                   inverseRest(meanDielectric.z)};
+    const Rgb rest = inverseRest(meanDielectric);
     const Rgb body = minimum(s.baseColour * rest, 1.f) * entering * (opaque_ * base_);
     diffuse_ = body * rest;
 
@@ -273,6 +296,20 @@ void BasicBsdf<F>::setReflecting(const SurfaceParameters& s, bool fromInside, fl
     albedo_ = Rgb(coatAlbedo_ + sheenEnergy) + single + spread + through;
     probability_ = {coatAlbedo_, maxComponent(single), maxComponent(spread), maxComponent(through),
                     sheenEnergy};
+}
+
+/// Diffuse lobes send all their light above the true surface.
+template <Features F>
+void BasicBsdf<F>::leaveAbove() {
+    const float whole = 2 / (1 + up_.z);  // of a cosine lobe over what is above
+    if constexpr (!F.reflection) {
+        diffuse_ *= whole;
+    } else {
+        const Albedo& mean = row_.mean();
+        const Albedo above = row_.meanAbove(up_.z);
+        diffuse_ *= (Rgb(1) - dielectricAlbedo(mean)) * inverseRest(dielectricAlbedo(above)) * whole;
+        multiple_ *= (1 - mean.whole) * inverseRest(above.whole) * whole;
+    }
 }
 
 /// Albedo of the dielectric layer, multiple scattering included.
@@ -370,41 +407,67 @@ BsdfValue BasicBsdf<F>::glass(const Vec3& wi) const {
     return {split.transmitted * (glassWeight_ * common * g2), (1 - split.reflectProbability) * common * g1};
 }
 
+/// All smooth lobes at wi, which may be the image of the direction that is asked for.
 template <Features F>
-BsdfValue BasicBsdf<F>::evaluate(const Vec3& wi) const {
+template <bool kImage>
+BsdfValue BasicBsdf<F>::lobes(const Vec3& wi) const {
     BsdfValue sum;
     const auto add = [&](const BsdfValue& v, Lobe lobe) {
         sum.value += v.value;
         sum.pdf += v.pdf * probability_[lobe];
     };
     if (wi.z > 0) {
-        if (probability_[kDiffuse] > 0) add(diffuse(wi.z), kDiffuse);
+        if (probability_[kDiffuse] > 0) add(kImage ? BsdfValue{{}, wi.z * kInvPi} : diffuse(wi.z), kDiffuse);
         if (F.reflection && probability_[kReflection] > 0 && !smooth_) add(baseReflection(wi), kReflection);
         if (F.layers && probability_[kCoat] > 0 && !coatSmooth_) add(coatReflection(wi), kCoat);
         if (F.layers && probability_[kSheen] > 0) add(sheen(wi), kSheen);
     }
-    if (F.glass && probability_[kGlass] > 0 && !glassSmooth_ && wi.z != 0) add(glass(wi), kGlass);
+    if (F.glass && probability_[kGlass] > 0 && !glassSmooth_) add(glass(wi), kGlass);
+    return sum;
+}
+
+template <Features F>
+BsdfValue BasicBsdf<F>::evaluate(const Vec3& wi) const {
+    const float side = dot(wi, up_);
+    if (!(wi.z * side > 0)) return {};
+    BsdfValue sum = lobes<false>(wi);
+    const Vec3 image = imageOf(wi);
+    if (image.z * side > 0) {
+        const BsdfValue folded = lobes<true>(image);
+        sum.value += folded.value;
+        sum.pdf += folded.pdf;
+    }
     return sum;
 }
 
 /// The sample of a direction that some smooth lobe chose: weighed by all of them.
 template <Features F>
-BsdfSample BasicBsdf<F>::finish(const Vec3& wi) const {
+BsdfSample BasicBsdf<F>::finish(Vec3 wi, bool through) const {
+    if ((dot(wi, up_) < 0) != through) wi = imageOf(wi);
     const BsdfValue v = evaluate(wi);
     if (!(v.pdf > 0)) return {};
-    return {wi, v.value / v.pdf, v.pdf, false};
+    return {.wi = wi, .weight = v.value / v.pdf, .pdf = v.pdf, .through = through};
+}
+
+/// A delta lobe's sample on the side of the true surface where it belongs.
+template <Features F>
+BsdfSample BasicBsdf<F>::settled(BsdfSample s) const {
+    s.delta = true;
+    s.folded = (dot(s.wi, up_) < 0) != s.through;
+    if (s.folded) s.wi = imageOf(s.wi);
+    return s;
 }
 
 template <Features F>
 BsdfSample BasicBsdf<F>::mirror(const Rgb& weight, bool coat) const {
     countEffect(Effect::Mirror);
-    return {{-wo_.x, -wo_.y, wo_.z}, weight, 0, true, coat};
+    return settled({.wi = {-wo_.x, -wo_.y, wo_.z}, .weight = weight, .coat = coat});
 }
 
 template <Features F>
 BsdfSample BasicBsdf<F>::sampleMicrofacet(float alpha, Vec2 u) const {
     const Vec3 wi = reflected(wo_, Ggx{alpha}.sampleVisible(wo_, u));
-    return wi.z > 0 ? finish(wi) : BsdfSample{};
+    return wi.z > 0 ? finish(wi, false) : BsdfSample{};
 }
 
 template <Features F>
@@ -414,19 +477,20 @@ BsdfSample BasicBsdf<F>::sampleGlass(Vec2 u, float choice) const {
     const bool reflects = choice < split.reflectProbability;
     const Vec3 wi = reflects ? reflected(wo_, h) : refracted(wo_, h, eta_);
     if (reflects ? wi.z <= 0 : wi.z >= 0) return {};
-    if (!glassSmooth_) return finish(wi);
+    if (!glassSmooth_) return finish(wi, !reflects);
     countEffect(reflects ? Effect::Mirror : Effect::Transmission);
     const float scale = glassWeight_ / probability_[kGlass];
-    if (reflects) return {wi, split.reflected * (scale / split.reflectProbability), 0, true};
-    return {wi, split.transmitted * (scale / (1 - split.reflectProbability)), 0, true};
+    const Rgb weight = reflects ? split.reflected * (scale / split.reflectProbability)
+                                : split.transmitted * (scale / (1 - split.reflectProbability));
+    return settled({.wi = wi, .weight = weight, .through = !reflects});
 }
 
 template <Features F>
 BsdfSample BasicBsdf<F>::sample(Vec2 direction, float choice) const {
     if constexpr (!F.reflection)
-        return probability_[kDiffuse] > 0 ? finish(cosineHemisphere(direction)) : BsdfSample{};
+        return probability_[kDiffuse] > 0 ? finish(cosineHemisphere(direction), false) : BsdfSample{};
     float rest = choice;
-    if (rest < probability_[kDiffuse]) return finish(cosineHemisphere(direction));
+    if (rest < probability_[kDiffuse]) return finish(cosineHemisphere(direction), false);
     rest -= probability_[kDiffuse];
     if constexpr (F.reflection) {
         if (rest < probability_[kReflection])
@@ -435,7 +499,7 @@ BsdfSample BasicBsdf<F>::sample(Vec2 direction, float choice) const {
         rest -= probability_[kReflection];
     }
     if constexpr (F.layers) {
-        if (rest < probability_[kSheen]) return finish(cosineHemisphere(direction));
+        if (rest < probability_[kSheen]) return finish(cosineHemisphere(direction), false);
         rest -= probability_[kSheen];
         if (rest < probability_[kCoat])
             return coatSmooth_ ? mirror(Rgb(coatFresnel(wo_.z) / probability_[kCoat]), true)

@@ -18,6 +18,7 @@ struct Camera {
     float aspect = 0;          ///< width / height; 0: as the image
     float lensRadius = 0;      ///< metres; 0: pinhole
     float focusDistance = 0;   ///< along the axis; used when lensRadius > 0
+    bool preferred = false;    ///< marked as the one to use (extras `active`)
     std::string unusable;      ///< why it cannot be rendered from (orthographic, ...); empty when it can
 };
 

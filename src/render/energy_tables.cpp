@@ -1,5 +1,7 @@
 #include "energy_tables.h"
 
+#include <numbers>
+
 #include "variolux/base/parallel.h"
 #include "variolux/base/sobol.h"
 
@@ -43,6 +45,13 @@ Albedo integrateReflection(float cosTheta, float roughness, float ior) {
             static_cast<float>(dielectric / kPoints)};
 }
 
+/// Part of the directions at a cosine to the normal that is above a plane tilted against it.
+double partAbove(double cosine, double cosTilt) {
+    const double across = std::sqrt((1 - cosine * cosine) * (1 - cosTilt * cosTilt));
+    const double limit = -cosine * cosTilt;  // of across x the cosine of the azimuth
+    return across > -limit ? std::acos(limit / across) / std::numbers::pi : 1;
+}
+
 float integrateGlass(float cosTheta, float roughness, float eta) {
     const Ggx ggx{square(roughness)};
     if (ggx.alpha < kSmoothAlpha) return 1;
@@ -74,16 +83,22 @@ AlbedoTable::AlbedoTable(float ior) : ior_(ior) {
         // own piecewise linear interpolant: three-point Gauss is exact (degree 4 in s).
         constexpr std::array<std::array<double, 2>, 3> gauss{
             {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
-        Albedo mean{0, 0, 0};
-        for (std::size_t j = 0; j + 1 < kSize; ++j) {
-            for (const auto& [t, w] : gauss) {
-                const double s = (static_cast<double>(j) + t) / (kSize - 1);
-                const auto share = static_cast<float>(t);
-                mean = mean + (cells_[i][j] * (1 - share) + cells_[i][j + 1] * share) *
-                                  static_cast<float>(4 * s * s * s * w / (kSize - 1));
+        for (std::size_t k = 0; k < kTilts; ++k) {
+            const double cosTilt = static_cast<double>(k) / (kTilts - 1);
+            Albedo sum{0, 0, 0};
+            double total = 0;
+            for (std::size_t j = 0; j + 1 < kSize; ++j) {
+                for (const auto& [t, w] : gauss) {
+                    const double s = (static_cast<double>(j) + t) / (kSize - 1);
+                    const auto share = static_cast<float>(t);
+                    const double weight = 4 * s * s * s * w / (kSize - 1) * partAbove(s * s, cosTilt);
+                    sum = sum + (cells_[i][j] * (1 - share) + cells_[i][j + 1] * share) *
+                                    static_cast<float>(weight);
+                    total += weight;
+                }
             }
+            means_[i][k] = sum * static_cast<float>(1 / total);
         }
-        means_[i] = mean;
     });
     constexpr int steps = 512;
     double sum = 0;

@@ -56,11 +56,15 @@ class AlbedoTable {
       public:
         Albedo at(float cosTheta) const;
         const Albedo& mean() const { return mean_; }
+        /// The mean over directions above a plane whose normal is tilted.
+        Albedo meanAbove(float cosTilt) const;
 
       private:
         friend class AlbedoTable;
         const Albedo* low_ = nullptr;
         const Albedo* high_ = nullptr;
+        const Albedo* lowMeans_ = nullptr;
+        const Albedo* highMeans_ = nullptr;
         float t_ = 0;
         Albedo mean_;
     };
@@ -77,7 +81,9 @@ class AlbedoTable {
     float meanWeight_ = 0;
     /// Nodes are at roughness i / (kSize - 1), and at cosines (j / (kSize - 1))^2: dense at grazing angles.
     std::array<std::array<Albedo, kSize>, kSize> cells_;
-    std::array<Albedo, kSize> means_;
+    static constexpr std::size_t kTilts = 16;
+    /// Means above planes at cosines k / (kTilts - 1) of the tilt; the last of each is the mean over all.
+    std::array<std::array<Albedo, kTilts>, kSize> means_;
 };
 
 inline AlbedoTable::Row AlbedoTable::row(float roughness) const {
@@ -85,9 +91,17 @@ inline AlbedoTable::Row AlbedoTable::row(float roughness) const {
     Row row;
     row.low_ = cells_[i].data();
     row.high_ = cells_[i + 1].data();
+    row.lowMeans_ = means_[i].data();
+    row.highMeans_ = means_[i + 1].data();
     row.t_ = t;
-    row.mean_ = means_[i] * (1 - t) + means_[i + 1] * t;
+    row.mean_ = row.lowMeans_[kTilts - 1] * (1 - t) + row.highMeans_[kTilts - 1] * t;
     return row;
+}
+
+inline Albedo AlbedoTable::Row::meanAbove(float cosTilt) const {
+    const auto [k, t] = tablePosition(cosTilt, kTilts);
+    return (lowMeans_[k] * (1 - t) + lowMeans_[k + 1] * t) * (1 - t_) +
+           (highMeans_[k] * (1 - t) + highMeans_[k + 1] * t) * t_;
 }
 
 inline Albedo AlbedoTable::Row::at(float cosTheta) const {

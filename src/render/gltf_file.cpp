@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 
+#include "gltf_check.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {
@@ -91,14 +92,16 @@ GltfFile::GltfFile(const std::string& path) : path_(path) {
     const std::size_t slash = path.find_last_of('/');
     const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash);
     const auto size = static_cast<unsigned int>(bytes.size());
+    const auto* text = reinterpret_cast<const char*>(bytes.data());
     std::string errors, warnings;
     bool good = false;
     if (size >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0) {
         checkChunks(path, bytes);
+        zeroAspects_ = checkGltf(path, {text + 20, word(bytes, 12)});
         good = loader.LoadBinaryFromMemory(&model_, &errors, &warnings, bytes.data(), size, folder);
     } else {
-        good = loader.LoadASCIIFromString(&model_, &errors, &warnings,
-                                          reinterpret_cast<const char*>(bytes.data()), size, folder);
+        zeroAspects_ = checkGltf(path, {text, bytes.size()});
+        good = loader.LoadASCIIFromString(&model_, &errors, &warnings, text, size, folder);
     }
     if (!good) fail(firstLine(errors));
 }

@@ -12,7 +12,8 @@
 
 namespace vlx::render {
 
-/// A parsed glTF file whose references are checked when they are followed: tinygltf does not.
+/// A parsed glTF file. Its JSON is checked first (gltf_check.h), the bytes that references lead to when they
+/// are followed: tinygltf does neither.
 class GltfFile {
   public:
     /// Parses the file and loads its buffers; images stay encoded.
@@ -20,6 +21,8 @@ class GltfFile {
 
     const std::string& path() const { return path_; }
     const tinygltf::Model& model() const { return model_; }
+    /// Whether a camera's aspectRatio is 0, not just missing.
+    bool zeroAspect(std::size_t camera) const { return zeroAspects_[camera]; }
 
     [[noreturn]] void fail(const std::string& message) const;
 
@@ -44,6 +47,7 @@ class GltfFile {
     std::vector<double> values(int accessor, int components, const std::string& what) const;
 
     std::string path_;
+    std::vector<bool> zeroAspects_;
     tinygltf::Model model_;
 };
 

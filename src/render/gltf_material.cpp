@@ -1,5 +1,7 @@
 #include "gltf_material.h"
 
+#include "gltf_check.h"
+
 namespace vlx::render {
 namespace {
 
@@ -81,6 +83,12 @@ TextureRef MaterialReader::texture(int index, int uvSet, const tinygltf::Extensi
         return ref;
     }
     const tinygltf::Texture& source = model.textures[static_cast<std::size_t>(index)];
+    if (source.source < 0) {
+        std::string only;
+        for (const auto& [name, value] : source.extensions)
+            if (!isSupported(name)) only += ", only one of " + name + remedyFor(name);
+        file_.fail(what + " uses texture " + std::to_string(index) + ", which has no source" + only);
+    }
     Texture loaded = file_.image(source.source, space);
     if (source.sampler >= 0 && static_cast<std::size_t>(source.sampler) < model.samplers.size()) {
         const tinygltf::Sampler& sampler = model.samplers[static_cast<std::size_t>(source.sampler)];

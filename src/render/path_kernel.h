@@ -23,13 +23,6 @@ inline Ray leave(const SurfacePoint& point, const Vec3& direction, float time) {
     return {point.position + point.geometricNormal * side, direction, time};
 }
 
-/// Whether a direction is on the same side of the true and of the shading surface: light that only one of
-/// them lets through an opaque surface is a leak. Through glass it goes on, on the side where it truly is.
-template <Features F>
-bool consistent(const SurfacePoint& point, const Vec3& direction, float localZ) {
-    return (F.glass && point.material->transmissive()) || dot(point.geometricNormal, direction) * localZ > 0;
-}
-
 /// Part of light that is left after a distance in a medium.
 inline Rgb transmitted(const Rgb& absorption, float distance) {
     countEffect(Effect::Absorption);
@@ -45,7 +38,6 @@ Rgb PathTracer::directLight(const SurfacePoint& point, const Frame& frame, const
     const LightSample light = lights_.sample(local, choice, u);
     if (!(light.pdf > 0) || isBlack(light.radiance)) return {};
     const Vec3 wi = frame.toLocal(light.direction);
-    if (!consistent<F>(point, light.direction, wi.z)) return {};
     const BsdfValue f = bsdf.evaluate(wi);
     if (isBlack(f.value)) return {};
     if (accelerator_.occluded(leave(point, light.direction, state.time), light.distance, state.seed))
@@ -54,7 +46,8 @@ Rgb PathTracer::directLight(const SurfacePoint& point, const Frame& frame, const
     const float weight = alone ? 1 : powerHeuristic(light.pdf, f.pdf);
     Rgb radiance = light.radiance;
     if constexpr (F.rare) {
-        const Material* medium = wi.z < 0 ? state.beyond : state.medium;
+        const Material* medium =
+            dot(point.geometricNormal, light.direction) < 0 ? state.beyond : state.medium;
         if (medium != nullptr) radiance *= transmitted(medium->absorption, light.distance);
     }
     return f.value * radiance * (weight / light.pdf);
@@ -139,7 +132,7 @@ PathSample PathTracer::traceWith(Ray ray, const PathSampler& sampler) const {
         const Frame frame(point.shadingNormal);
         const Vec3 wo = frame.toLocal(-ray.direction);
         const BasicBsdf<F> bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, point.fromBehind,
-                                scene_.albedoTables[0]);
+                                scene_.albedoTables[0], frame.toLocal(point.geometricNormal));
         if (featuresPending && (bsdf.hasSmoothLobe() || emits)) {
             featuresPending = false;
             result.normal = point.shadingNormal;
@@ -165,12 +158,11 @@ PathSample PathTracer::traceWith(Ray ray, const PathSampler& sampler) const {
         const BsdfSample next = bsdf.sample(pairs[dimension::kDirection], choice.x);
         if (isBlack(next.weight)) break;
         const Vec3 direction = normalized(frame.toWorld(next.wi));
-        if (!consistent<F>(point, direction, next.wi.z)) break;
         throughput *= next.weight;
         bsdfPdf = next.pdf;
         lightsSampled = lightsSampled && !next.delta;
         if constexpr (F.rare) {
-            if (next.wi.z < 0) medium = state.beyond;
+            if (next.through) medium = state.beyond;
             scattered = scattered || !next.delta;
             caustic = dropsCaustics_ && scattered && next.delta;
         }

@@ -85,7 +85,8 @@ struct Scene {
     std::vector<SheenTable> sheenTables;  ///< one when anything has sheen
 
     std::vector<Camera> cameras;
-    std::size_t activeCamera = 0;  ///< the one to use by default
+    std::size_t activeCamera = 0;  ///< the one to use by default: wantedCamera or the first usable one
+    std::size_t wantedCamera = 0;  ///< which the file means: marked `active`, or the first
     std::vector<Light> lights;
     Environment environment;
     Shutter shutter;             ///< during which motions were followed

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 
 #include "gltf_animation.h"
+#include "gltf_camera.h"
+#include "gltf_check.h"
 #include "gltf_file.h"
 #include "gltf_geometry.h"
 #include "gltf_material.h"
@@ -43,17 +44,6 @@ Transform localTransform(const GltfFile& file, const tinygltf::Node& node, const
     return t;
 }
 
-/// Rotation and translation of a transform: cameras do not scale.
-std::optional<Transform> rigid(const Transform& t) {
-    Transform r = t;
-    for (std::size_t j = 0; j < 3; ++j) {
-        const double norm = std::sqrt(t.m[0][j] * t.m[0][j] + t.m[1][j] * t.m[1][j] + t.m[2][j] * t.m[2][j]);
-        if (!(norm > 0) || !std::isfinite(norm)) return std::nullopt;
-        for (std::size_t i = 0; i < 3; ++i) r.m[i][j] = t.m[i][j] / norm;
-    }
-    return r;
-}
-
 class Loader {
   public:
     Loader(const std::string& path, const Shutter& shutter)
@@ -70,9 +60,11 @@ class Loader {
     Scene load(const EnvironmentOptions& environment) {
         checkExtensions();
         readMaterials();
-        readNodes();
+        const std::vector<Placed> placed = placedNodes();
+        readCameras(placed);
+        readNodes(placed);
         readEnvironment(environment);
-        if (scene_.cameras.empty()) file_.fail("has no camera");
+        if (const std::string fault = cameraFault(placed); !fault.empty()) file_.fail(fault);
         if (scene_.shapes.empty() && !scene_.environment) file_.fail("has no triangles and no environment");
         completeScene(scene_);
         const bool glows = std::ranges::any_of(
@@ -82,6 +74,13 @@ class Loader {
                 "has no light: neither punctual lights nor emissive surfaces nor an environment (give one "
                 "with "
                 "--env-constant or --env)");
+        return std::move(scene_);
+    }
+
+    Scene loadCameras() {
+        const std::vector<Placed> placed = placedNodes();
+        readCameras(placed);
+        if (const std::string fault = cameraFault(placed); !fault.empty()) warn(fault);
         return std::move(scene_);
     }
 
@@ -99,16 +98,8 @@ class Loader {
     void warn(const std::string& text) { scene_.report.warnings.push_back(text); }
 
     void checkExtensions() {
-        static const std::set<std::string> known = {
-            "KHR_lights_punctual",     "KHR_texture_transform",      "KHR_mesh_quantization",
-            "KHR_materials_ior",       "KHR_materials_specular",     "KHR_materials_emissive_strength",
-            "KHR_materials_clearcoat", "KHR_materials_transmission", "KHR_materials_sheen",
-            "KHR_materials_volume"};
-        for (const std::string& name : model_.extensionsRequired)
-            if (!known.contains(name))
-                file_.fail("requires the extension " + name + ", which is not supported");
         for (const std::string& name : model_.extensionsUsed)
-            if (!known.contains(name)) warn("the extension " + name + " is ignored");
+            if (!isSupported(name)) warn("the extension " + name + " is ignored");
         if (!model_.skins.empty()) warn("skins are left at rest");
     }
 
@@ -191,14 +182,12 @@ class Loader {
         return placed;
     }
 
-    void readNodes() {
-        const std::vector<Placed> placed = placedNodes();
+    void readNodes(const std::vector<Placed>& placed) {
         std::map<std::size_t, std::vector<Place>> uses;  // mesh -> where
         std::vector<std::size_t> order;
         for (const auto& [index, toWorld, motion] : placed) {
             const tinygltf::Node& node = model_.nodes[index];
             const std::string what = described("node", index, node.name);
-            if (node.camera >= 0) readCamera(node, toWorld, motion, what);
             if (const auto* light = extension(node.extensions, "KHR_lights_punctual")) {
                 readLight(static_cast<int>(number(*light, "light", -1)), node, toWorld, what);
                 if (motion.moves())
@@ -255,46 +244,41 @@ class Loader {
         });
     }
 
-    void readCamera(const tinygltf::Node& node, const Transform& toWorld, const Motion& motion,
-                    const std::string& what) {
-        const auto index = static_cast<std::size_t>(node.camera);
-        if (index >= model_.cameras.size())
-            file_.fail(what + " refers to camera " + std::to_string(index) + ", the file has " +
-                       std::to_string(model_.cameras.size()));
-        const tinygltf::Camera& source = model_.cameras[index];
-        Camera camera;
-        camera.name = node.name.empty() ? source.name : node.name;
-        if (const auto place = rigid(toWorld)) {
-            camera.toWorld = *place;
-        } else {
-            camera.unusable = "its transform has no inverse";
-        }
-        camera.motion.cause = motion.cause;
-        for (const Transform& place : motion.places) {
-            const auto rigidPlace = rigid(place);
-            if (!rigidPlace) camera.unusable = "its transform has no inverse while the shutter is open";
-            camera.motion.places.push_back(rigidPlace.value_or(place));
-        }
-        camera.verticalFov = static_cast<float>(source.perspective.yfov);
-        camera.aspect = static_cast<float>(source.perspective.aspectRatio);
-        if (source.type != "perspective")
-            camera.unusable = "it is not a perspective camera";
-        else if (!(camera.verticalFov > 0 && camera.verticalFov < kPi))
-            camera.unusable =
-                "its yfov is " + std::to_string(camera.verticalFov) + ", expected between 0 and pi";
-        if (!(camera.aspect > 0 && camera.aspect < 1e6f)) camera.aspect = 0;
-        const auto extra = [&](const char* key) {
-            return number(node.extras, key, number(source.extras, key, 0));
+    void readCameras(const std::vector<Placed>& placed) {
+        for (const auto& [index, toWorld, motion] : placed)
+            if (model_.nodes[index].camera >= 0)
+                scene_.cameras.push_back(readCamera(file_, model_.nodes[index], toWorld, motion));
+        const auto firstOf = [&](auto which) {
+            const auto found = std::ranges::find_if(scene_.cameras, which);
+            return static_cast<std::size_t>(found == scene_.cameras.end() ? 0
+                                                                          : found - scene_.cameras.begin());
         };
-        camera.lensRadius = static_cast<float>(extra("lens_radius"));
-        camera.focusDistance = static_cast<float>(extra("focus_distance"));
-        if (camera.lensRadius > 0 && !(camera.focusDistance > 0))
-            camera.unusable = "it has a lens_radius but no positive focus_distance";
-        if (extra("active") != 0 && !activeSeen_) {
-            scene_.activeCamera = scene_.cameras.size();
-            activeSeen_ = true;
+        scene_.wantedCamera = firstOf([](const Camera& c) { return c.preferred; });
+        scene_.activeCamera = scene_.wantedCamera;
+        if (!scene_.cameras.empty() && !scene_.cameras[scene_.wantedCamera].unusable.empty())
+            scene_.activeCamera = firstOf([](const Camera& c) { return c.unusable.empty(); });
+    }
+
+    /// Why there is no camera to render from, or nothing.
+    std::string cameraFault(const std::vector<Placed>& placed) const {
+        constexpr const char* remedy =
+            "; no option stands in for a camera: add a perspective one to the scene";
+        if (model_.scenes.empty()) return "has no scene, and so no camera in one";
+        std::string text;
+        for (std::size_t i = 0; i < scene_.cameras.size(); ++i) {
+            const Camera& c = scene_.cameras[i];
+            if (c.unusable.empty()) return {};
+            text += (i == 0 ? "has no camera that can be used: " : "; ") + described("camera", i, c.name) +
+                    ": " + c.unusable;
         }
-        scene_.cameras.push_back(std::move(camera));
+        if (!text.empty()) return text + remedy;
+        for (std::size_t n = 0; n < model_.nodes.size(); ++n)
+            if (model_.nodes[n].camera >= 0 && std::ranges::find(placed, n, &Placed::node) == placed.end())
+                text += (text.empty() ? " (" : ", ") + described("node", n, model_.nodes[n].name);
+        if (text.empty()) return std::string("has no camera") + remedy;
+        return "has no camera in its scene " + std::to_string(std::max(0, model_.defaultScene)) +
+               "; those of the file" + text +
+               ") are not in it: move one there, or make theirs the file's `scene`";
     }
 
     void readLight(int index, const tinygltf::Node& node, const Transform& toWorld, const std::string& what) {
@@ -369,7 +353,6 @@ class Loader {
     Shutter shutter_;
     Animations animations_;
     tinygltf::Value sceneExtras_;
-    bool activeSeen_ = false;
     std::vector<std::int64_t> parents_;  ///< of each node; -1: a root
 };
 
@@ -377,6 +360,10 @@ class Loader {
 
 Scene loadScene(const std::string& path, const EnvironmentOptions& environment, const Shutter& shutter) {
     return Loader(path, shutter).load(environment);
+}
+
+Scene loadCameras(const std::string& path, const Shutter& shutter) {
+    return Loader(path, shutter).loadCameras();
 }
 
 }  // namespace vlx::render

@@ -23,11 +23,15 @@ struct EnvironmentOptions {
 /// `env_constant`. Animations of nodes are followed while the shutter is open; lights stay where they are in
 /// its middle, skins and morph targets at rest; points and lines are left out: said in the report's warnings.
 ///
-/// Throws Error, naming the file and what in it is wrong: not glTF; buffers missing or too short; accessors,
-/// indices or nodes out of range; vertices that are not finite; required extensions not in the list; no
-/// camera; nothing that gives light.
+/// Throws Error, naming the file and what in it is wrong: not glTF; required extensions not in the list;
+/// values of wrong types, references to what is not there (gltf_check.h); buffers missing or too short;
+/// indices out of range; vertices that are not finite; textures without an image that can be read; no camera
+/// that can be used; nothing that gives light.
 Scene loadScene(const std::string& path, const EnvironmentOptions& environment = {},
                 const Shutter& shutter = {});
+
+/// The cameras of a scene alone, whatever else it lacks. Why none can be used is in the report's warnings.
+Scene loadCameras(const std::string& path, const Shutter& shutter = {});
 
 /// Derives what follows from a scene's geometry, materials and lights, which must be set: bounds, glass
 /// tables, mesh lights of emissive shapes, the environment's light. loadScene ends with it.

@@ -35,7 +35,7 @@ SheenTable::SheenTable() {
                     sum += charlieSheen(wo, {r * std::cos(phi), r * std::sin(phi), z}, roughness) * z;
                 }
             }
-            cells_[i][j] = static_cast<float>(std::min(1.0, sum * 2 * std::numbers::pi / (n * n)));
+            cells_[i][j] = static_cast<float>(sum * 2 * std::numbers::pi / (n * n));
         }
     }
 }

@@ -11,7 +11,8 @@ namespace vlx::render {
 /// above the surface.
 float charlieSheen(const Vec3& wo, const Vec3& wi, float roughness);
 
-/// Directional albedo of charlieSheen: what a coat of sheen takes from the layers beneath.
+/// Directional albedo of charlieSheen: what a coat of sheen takes from the layers beneath. Above 1 at grazing
+/// angles: the visibility term keeps no energy there.
 class SheenTable {
   public:
     SheenTable();

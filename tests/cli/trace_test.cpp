@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -197,6 +198,90 @@ TEST(VlxTrace, AppendsToADump) {
     EXPECT_EQ(trace({kScene, "-o", folder / "c.exr", "--append", kScene}).exitCode, 1);
     EXPECT_EQ(trace({kScene, "-o", folder / "c.exr", "--sample-map", folder / "none.exr"}).exitCode, 1);
     EXPECT_EQ(folder.entries(), 2);
+}
+
+/// A scene of cameras alone: nothing to see, no light, an image that is missing.
+std::string camerasOnly(const std::string& path, const std::string& cameras) {
+    nlohmann::json scene = {{"asset", {{"version", "2.0"}}},
+                            {"images", {{{"uri", "gone.png"}}}},
+                            {"cameras", nlohmann::json::parse(cameras)},
+                            {"nodes", nlohmann::json::array()}};
+    for (std::size_t i = 0; i < scene["cameras"].size(); ++i) {
+        scene["nodes"].push_back({{"camera", i}, {"name", "cam" + std::to_string(i)}});
+        scene["scenes"][0]["nodes"].push_back(i);
+    }
+    std::ofstream(path) << scene;
+    return path;
+}
+
+const std::string kFlat =
+    R"({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9}})";
+
+std::string perspective(const std::string& aspect) {
+    return R"({"type": "perspective", "perspective": {"yfov": 0.6, "znear": 0.1, "aspectRatio": )" + aspect +
+           "}}";
+}
+
+TEST(VlxTrace, ListsTheCamerasOfAnyScene) {
+    const TemporaryFolder folder;
+    const ToolRun run = trace({camerasOnly(folder / "a.gltf", "[" + kFlat + "," + perspective("1") + "," +
+                                                                  perspective("2e-8") + "]"),
+                               "--list-cameras"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(run.out,
+              "0  cam0  unusable: it is not a perspective camera\n"
+              "1  cam1  (active)\n"
+              "2  cam2  unusable: its aspectRatio is 2e-08, expected 2^-20 to 2^20\n");
+    const ToolRun none = trace({camerasOnly(folder / "b.gltf", "[" + kFlat + "]"), "--list-cameras"});
+    EXPECT_EQ(none.exitCode, 0) << none.err;
+    EXPECT_EQ(none.out, "0  cam0  unusable: it is not a perspective camera\n");
+    EXPECT_NE(none.err.find("no camera that can be used"), std::string::npos) << none.err;
+    std::ofstream(folder / "c.gltf")
+        << R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]})";
+    const ToolRun empty = trace({folder / "c.gltf", "--list-cameras"});
+    EXPECT_EQ(empty.exitCode, 0) << empty.err;
+    EXPECT_EQ(empty.out, "");
+    EXPECT_NE(empty.err.find("no camera"), std::string::npos) << empty.err;
+}
+
+TEST(VlxTrace, TakesTheFirstUsableCameraAndSaysSo) {
+    const TemporaryFolder folder;
+    const std::string scene = camerasOnly(folder / "a.gltf", "[" + kFlat + "," + perspective("2") + "]");
+    const ToolRun run =
+        trace({scene, "-o", folder / "a.exr", "--env-constant", "1,1,1", "--width", "8", "--spp", "1"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_NE(run.err.find("'cam0' cannot be used"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("camera 1 'cam1'"), std::string::npos) << run.err;
+    EXPECT_EQ(DumpReader(folder / "a.exr").header().display.height, 4);
+    const ToolRun chosen = trace({scene, "-o", folder / "b.exr", "--env-constant", "1,1,1", "--width", "8",
+                                  "--spp", "1", "--camera", "cam1"});
+    EXPECT_EQ(chosen.err.find("cannot be used"), std::string::npos) << chosen.err;
+    const ToolRun asked = trace({scene, "-o", folder / "c.exr", "--env-constant", "1,1,1", "--camera", "0"});
+    EXPECT_NE(asked.exitCode, 0);
+    EXPECT_NE(asked.err.find("not a perspective"), std::string::npos) << asked.err;
+}
+
+TEST(VlxTrace, PicturesOfACamerasAspectAreOfASizeThereIs) {
+    const TemporaryFolder folder;
+    for (const char* aspect : {"2e-8", "1e30", "0", "-1", "-1e30", "1e-300"}) {
+        const ToolRun run = trace({camerasOnly(folder / "a.gltf", "[" + perspective(aspect) + "]"), "-o",
+                                   folder / "a.exr", "--env-constant", "1,1,1", "--spp", "1"});
+        EXPECT_EQ(run.exitCode, 1) << aspect;
+        EXPECT_NE(run.err.find("aspectRatio"), std::string::npos) << run.err;
+    }
+    // An aspect that a picture may have, but not at this size.
+    for (const auto& [aspect, given, missing] :
+         {std::array{"1e-4", "--width", "--height"}, {"1e4", "--height", "--width"}}) {
+        const std::string scene = camerasOnly(folder / "a.gltf", "[" + perspective(aspect) + "]");
+        const ToolRun run =
+            trace({scene, "-o", folder / "a.exr", "--env-constant", "1,1,1", "--spp", "1", given, "512"});
+        EXPECT_EQ(run.exitCode, 1) << run.err;
+        EXPECT_NE(run.err.find(std::string("give ") + missing), std::string::npos) << run.err;
+        EXPECT_EQ(trace({scene, "-o", folder / "b.exr", "--env-constant", "1,1,1", "--spp", "1", given, "8",
+                         missing, "4", "--overwrite"})
+                      .exitCode,
+                  0);
+    }
 }
 
 }  // namespace

@@ -241,6 +241,25 @@ TEST(BidirectionalSurfaces, LayersAgree) {
     expectAgreement(t);
 }
 
+TEST(BidirectionalSurfaces, ShadingNormalsFarFromTheTrueOnesAgree) {
+    // Of a few triangles: much is reflected into the surface, refracted out of it, and folded back.
+    for (const auto& [metallic, roughness, transmission] :
+         {std::array{1.f, 0.f, 0.f}, {1.f, 0.2f, 0.f}, {0.f, 0.2f, 0.f}, {0.f, 0.f, 1.f}, {0.f, 0.3f, 1.f}}) {
+        SCOPED_TRACE(::testing::Message() << metallic << ", " << roughness << ", " << transmission);
+        TestScene t;
+        room(t);
+        Material m = TestScene::glass(1.5f, roughness);
+        m.transmission = transmission;
+        m.metallic = metallic;
+        const auto material = t.material(m);
+        t.sphere(material, {-0.4f, 0.5f, 0.2f}, 0.5f, 3);
+        t.sphere(material, {0.5f, 0.5f, 0.3f}, 0.4f, 2);
+        t.light(pointLight(LightType::Sphere));
+        lamp(t, Rgb(4));
+        expectAgreement(t);
+    }
+}
+
 TEST(BidirectionalSurfaces, SingleSidedAndHalfTransparentOnesAgree) {
     TestScene t;
     room(t);

@@ -1,0 +1,302 @@
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <optional>
+
+#include "../base/temporary_folder.h"
+#include "gltf_text.h"
+#include "scene_loader.h"
+#include "variolux/base/error.h"
+
+/// Scenes of which a reader would take something in silence, or speak of something else.
+namespace vlx::render {
+namespace {
+
+using nlohmann::json;
+
+Scene load(const json& scene, const GltfText& g = {}) {
+    static const TemporaryFolder folder;
+    GltfText changed = g;
+    changed.json = scene;
+    writeText(folder / "scene.gltf", changed.text());
+    return loadScene(folder / "scene.gltf");
+}
+
+std::string failure(const json& scene, const GltfText& g = {}) {
+    try {
+        load(scene, g);
+    } catch (const Error& e) {
+        return e.what();
+    }
+    return "no error";
+}
+
+/// The square with a textured material.
+GltfText textured() {
+    GltfText g;
+    const int texture = g.texture({0x89, 'P', 'N', 'G'});
+    g.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = texture;
+    return g;
+}
+
+void expectFailureWith(const std::vector<std::string>& words, const json& scene, const GltfText& g = {}) {
+    const std::string message = failure(scene, g);
+    for (const std::string& word : words)
+        EXPECT_NE(message.find(word), std::string::npos) << word << " in: " << message;
+}
+
+TEST(RequiredExtensions, AreRefusedFirstByNameAndWithARemedy) {
+    for (const auto& [name, remedy] : {std::pair{"KHR_draco_mesh_compression", "gltf-transform copy"},
+                                       {"EXT_meshopt_compression", "gltfpack without -c"},
+                                       {"KHR_meshopt_compression", "gltf-transform copy"},
+                                       {"KHR_texture_basisu", "ktxdecompress"},
+                                       {"EXT_texture_webp", "gltf-transform png"},
+                                       {"VENDOR_sparkle", "without"}}) {
+        // Of all the faults of the file.
+        GltfText g;
+        g.json["extensionsRequired"] = {"KHR_lights_punctual", name};
+        g.json["buffers"].push_back({{"byteLength", 60}, {"uri", "nowhere.bin"}});
+        g.json["accessors"][0].erase("bufferView");
+        g.json["meshes"][0]["primitives"][0]["indices"] = 77;
+        g.json["scene"] = "first";
+        expectFailureWith({std::string("requires the extension ") + name, remedy}, g.json, g);
+    }
+    GltfText g;
+    g.json["extensionsRequired"] = {"KHR_draco_mesh_compression", "KHR_texture_basisu"};
+    expectFailureWith({"KHR_draco_mesh_compression, KHR_texture_basisu", "copy", "ktxdecompress"}, g.json);
+    g.json["extensionsRequired"] = {7};
+    expectFailureWith({"extensionsRequired", "7"}, g.json);
+    g.json["extensionsRequired"] = "KHR_texture_basisu";
+    expectFailureWith({"extensionsRequired", "array", "KHR_texture_basisu"}, g.json);
+}
+
+TEST(CompressedData, ThatHasNoPlainFormIsRefusedByName) {
+    GltfText g;
+    g.json["accessors"][0].erase("bufferView");
+    g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["bufferView"] = 0;
+    expectFailureWith({"KHR_draco_mesh_compression", "gltf-transform copy"}, g.json, g);
+    GltfText m;
+    m.json["buffers"].push_back(
+        {{"byteLength", 60}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
+    expectFailureWith({"EXT_meshopt_compression", "gltfpack"}, m.json, m);
+}
+
+TEST(CompressedData, ThatHasAPlainFormIsReadFromThere) {
+    GltfText g;
+    g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["bufferView"] = 0;
+    g.json["extensionsUsed"].push_back("KHR_draco_mesh_compression");
+    EXPECT_EQ(load(g.json, g).triangleCount(), 2u);
+}
+
+TEST(Textures, WithoutASourceNameTheExtensionThatHasIt) {
+    for (const char* extension : {"KHR_texture_basisu", "EXT_texture_webp"}) {
+        GltfText g = textured();
+        g.json["textures"][0] = {{"extensions", {{extension, {{"source", 0}}}}}};
+        expectFailureWith({"texture 0", "no source", extension, "gltf-transform"}, g.json, g);
+    }
+    GltfText g = textured();
+    g.json["textures"][0] = json::object();
+    expectFailureWith({"texture 0", "no source"}, g.json, g);
+}
+
+/// Every reference by number: below 0, beyond what is there, no number at all.
+TEST(References, OfAnyKindAreCheckedEverywhere) {
+    GltfText g = textured();
+    json& j = g.json;
+    j["samplers"] = {json::object()};
+    j["textures"][0]["sampler"] = 0;
+    j["skins"] = {{{"joints", {0}}, {"inverseBindMatrices", 0}, {"skeleton", 0}}};
+    j["nodes"][0]["skin"] = 0;
+    j["nodes"][0]["children"] = {2};
+    j["scenes"][0]["nodes"] = {0, 1};
+    j["animations"] = {{{"samplers", {{{"input", 0}, {"output", 0}}}},
+                        {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}}}};
+    j["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 0}}};
+    j["materials"][0]["extensions"]["KHR_materials_clearcoat"]["clearcoatTexture"]["index"] = 0;
+    j["accessors"][0]["sparse"] = {{"count", 0},
+                                   {"indices", {{"bufferView", 0}, {"componentType", 5123}}},
+                                   {"values", {{"bufferView", 0}}}};
+    const std::vector<std::string> places = {
+        "/scene",
+        "/scenes/0/nodes/1",
+        "/nodes/0/mesh",
+        "/nodes/1/camera",
+        "/nodes/0/skin",
+        "/nodes/0/children/0",
+        "/nodes/2/extensions/KHR_lights_punctual/light",
+        "/meshes/0/primitives/0/attributes/POSITION",
+        "/meshes/0/primitives/0/targets/0/POSITION",
+        "/meshes/0/primitives/0/indices",
+        "/meshes/0/primitives/0/material",
+        "/accessors/0/bufferView",
+        "/accessors/0/sparse/indices/bufferView",
+        "/accessors/0/sparse/values/bufferView",
+        "/bufferViews/0/buffer",
+        "/images/0/bufferView",
+        "/textures/0/source",
+        "/textures/0/sampler",
+        "/materials/0/pbrMetallicRoughness/baseColorTexture/index",
+        "/materials/0/extensions/KHR_materials_clearcoat/clearcoatTexture/index",
+        "/skins/0/joints/0",
+        "/skins/0/skeleton",
+        "/skins/0/inverseBindMatrices",
+        "/animations/0/channels/0/target/node",
+        "/animations/0/samplers/0/input",
+        "/animations/0/samplers/0/output"};
+    j["buffers"] = json::parse(g.text())["buffers"];
+    for (const std::string& place : places)
+        for (const json& bad : {json(-1), json(-7), json(99u), json("0"), json(0.5), json(true),
+                                json(nullptr), json::array(), json(18446744073709551615u)}) {
+            json changed = j;
+            const json::json_pointer pointer(place);
+            ASSERT_TRUE(changed.contains(pointer)) << place;
+            changed[pointer] = bad;
+            const std::string message = failure(changed, g);
+            // Named as the file has it: nodes[0].mesh.
+            const std::string name = pointer.parent_pointer().empty() ? pointer.back()
+                                     : std::isdigit(static_cast<unsigned char>(pointer.back()[0]))
+                                         ? "[" + pointer.back() + "]"
+                                         : "." + pointer.back();
+            EXPECT_NE(message.find(name), std::string::npos) << place << " " << bad << ": " << message;
+            EXPECT_NE(message.find(bad.is_number_unsigned() ? "refers to" : "expected"), std::string::npos)
+                << place << " " << bad << ": " << message;
+        }
+}
+
+TEST(Values, OfTheWrongTypeAreRefused) {
+    struct Case {
+        const char* place;
+        json bad;
+    };
+    for (const auto& [place, bad] :
+         std::vector<Case>{{"/materials/0/pbrMetallicRoughness/metallicFactor", "0"},
+                           {"/materials/0/pbrMetallicRoughness/roughnessFactor", "rough"},
+                           {"/materials/0/pbrMetallicRoughness/baseColorFactor", {1, 1, 1}},
+                           {"/materials/0/pbrMetallicRoughness/baseColorFactor", {1, 1, "1", 1}},
+                           {"/materials/0/pbrMetallicRoughness", 5},
+                           {"/materials/0/emissiveFactor", "white"},
+                           {"/materials/0/alphaMode", 1},
+                           {"/materials/0/doubleSided", 1},
+                           {"/materials/0/normalTexture", 0},
+                           {"/materials/0/normalTexture", json::object()},
+                           {"/materials/0/extensions/KHR_materials_ior/ior", "1.5"},
+                           {"/materials/0/extensions/KHR_materials_specular/specularColorFactor", {1}},
+                           {"/materials/0", "paint"},
+                           {"/materials", 3},
+                           {"/nodes/0/translation", {0, 0}},
+                           {"/nodes/0/rotation", {0, 0, 0, "1"}},
+                           {"/nodes/0/scale", 2},
+                           {"/nodes/0/matrix", {1, 0, 0, 0}},
+                           {"/nodes/0/children", 0},
+                           {"/nodes/0", nullptr},
+                           {"/nodes", json::object()},
+                           {"/scenes/0/nodes", "all"},
+                           {"/meshes/0/primitives", json::object()},
+                           {"/meshes/0/primitives/0/attributes", json::array()},
+                           {"/meshes/0/primitives/0/mode", "TRIANGLES"},
+                           {"/accessors/0/count", "4"},
+                           {"/accessors/0/count", -4},
+                           {"/accessors/0/byteOffset", -12},
+                           {"/accessors/0/normalized", 1},
+                           {"/accessors/0/componentType", "FLOAT"},
+                           {"/bufferViews/0/byteLength", "48"},
+                           {"/bufferViews/0/byteOffset", -1},
+                           {"/bufferViews/0/byteStride", -12},
+                           {"/cameras/0/type", 1},
+                           {"/cameras/0/perspective", "wide"},
+                           {"/cameras/0/perspective/yfov", "0.8"},
+                           {"/cameras/0/perspective/aspectRatio", "1"},
+                           {"/extensions/KHR_lights_punctual/lights/0/intensity", "bright"},
+                           {"/extensions/KHR_lights_punctual/lights/0/color", "red"},
+                           {"/extensions/KHR_lights_punctual/lights", 1},
+                           {"/extensionsUsed", "KHR_lights_punctual"},
+                           {"/asset", "2.0"}}) {
+        GltfText g;
+        const json::json_pointer pointer(place);
+        g.json[pointer] = bad;
+        const std::string message = failure(g.json, g);
+        EXPECT_NE(message.find("expected"), std::string::npos) << place << " " << bad << ": " << message;
+        EXPECT_NE(message.find(std::string(place).substr(1, 4)), std::string::npos) << message;
+    }
+}
+
+TEST(Values, ThatNoDoubleHoldsAreRefused) {
+    GltfText g;
+    std::string text = g.text();
+    text.replace(text.find("0.8"), 3, "1e999");
+    static const TemporaryFolder folder;
+    writeText(folder / "huge.gltf", text);
+    EXPECT_THROW(loadScene(folder / "huge.gltf"), Error);
+}
+
+/// A file with cameras of these properties, each in a node of its own.
+GltfText withCameras(const std::vector<json>& cameras) {
+    GltfText g;
+    g.json["cameras"] = json::array();
+    g.json["scenes"][0]["nodes"] = {0, 2};
+    for (const json& camera : cameras) {
+        g.json["cameras"].push_back(camera);
+        g.json["nodes"].push_back({{"camera", g.json["cameras"].size() - 1}, {"translation", {0, 0, 3}}});
+        g.json["scenes"][0]["nodes"].push_back(g.json["nodes"].size() - 1);
+    }
+    g.json["nodes"][1].erase("camera");
+    return g;
+}
+
+json perspective(double yfov, std::optional<double> aspect = {}) {
+    json p = {{"yfov", yfov}, {"znear", 0.1}};
+    if (aspect) p["aspectRatio"] = *aspect;
+    return {{"type", "perspective"}, {"perspective", p}};
+}
+
+const json kOrthographic = {{"type", "orthographic"},
+                            {"orthographic", {{"xmag", 1}, {"ymag", 1}, {"znear", 0.1}, {"zfar", 10}}}};
+
+TEST(DefaultCamera, IsTheFirstThatCanBeUsed) {
+    const GltfText g = withCameras({kOrthographic, perspective(0), perspective(0.6)});
+    const Scene s = load(g.json, g);
+    EXPECT_EQ(s.activeCamera, 2u);
+    EXPECT_EQ(s.wantedCamera, 0u);
+    GltfText marked = withCameras({perspective(0.6), kOrthographic});
+    marked.json["nodes"][4]["extras"]["active"] = 1;
+    const Scene t = load(marked.json, marked);
+    EXPECT_EQ(t.activeCamera, 0u);
+    EXPECT_EQ(t.wantedCamera, 1u);
+}
+
+TEST(DefaultCamera, WithoutAUsableOneSaysWhyEachIsNot) {
+    for (const json& bad : {kOrthographic, perspective(0), perspective(-1), perspective(4),
+                            perspective(1e-30), perspective(0.6, 0), perspective(0.6, -1),
+                            perspective(0.6, 2e-8), perspective(0.6, 1e30), perspective(0.6, -0.0)}) {
+        const GltfText g = withCameras({bad, kOrthographic});
+        expectFailureWith({"no camera that can be used", "camera 0", "camera 1", "add a perspective"}, g.json,
+                          g);
+        // A usable one after it is taken.
+        const GltfText good = withCameras({bad, perspective(0.6)});
+        EXPECT_EQ(load(good.json, good).activeCamera, 1u) << bad;
+    }
+    for (const json& place : {json{{"scale", {0, 1, 1}}}, json{{"translation", {1e300, 0, 0}}}}) {
+        GltfText g = withCameras({perspective(0.6)});
+        g.json["nodes"][3].update(place);
+        expectFailureWith({"no camera that can be used", "camera 0"}, g.json, g);
+    }
+}
+
+TEST(DefaultCamera, ThatIsElsewhereIsNamed) {
+    GltfText g = withCameras({perspective(0.6)});
+    g.json["scenes"] = {{{"nodes", {0, 2}}}, {{"nodes", {3}}}};
+    g.json["nodes"][3]["name"] = "far";
+    expectFailureWith({"scene 0", "node 3 'far'", "`scene`"}, g.json, g);
+    g.json.erase("scene");
+    expectFailureWith({"scene 0", "node 3 'far'"}, g.json, g);
+    g.json["scene"] = 1;
+    g.json["nodes"][3]["children"] = {2};
+    g.json["scenes"][0]["nodes"] = {0};
+    expectFailureWith({"no triangles"}, g.json, g);
+    g.json.erase("scene");
+    g.json["scenes"] = json::array();
+    expectFailureWith({"no scene"}, g.json, g);
+}
+
+}  // namespace
+}  // namespace vlx::render
