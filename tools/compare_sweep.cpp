@@ -52,6 +52,10 @@ struct SweepCommand {
             ->check(CLI::Range(0, 1024))
             ->option_text("N");
 
+        app.add_flag("--overwrite", o.overwrite,
+                     "Run again what is in FOLDER already and was made by these very programs from the same "
+                     "inputs with the same parameters, which is else skipped");
+
         const char* const sampling = "Sampling";
         app.add_option("--spp", o.spp,
                        "Samples a pixel (default: 4,16,64,256; of a dump all it holds, halved up to four "

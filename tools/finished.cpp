@@ -42,12 +42,34 @@ std::string identityOf(const std::string& path) {
     return text;
 }
 
+// Of what is in a file, read as a stream; of one that cannot be read, of nothing.
+std::string hashOfFile(const std::string& path) {
+    const std::unique_ptr<XXH64_state_t, XXH_errorcode (*)(XXH64_state_t*)> state(XXH64_createState(),
+                                                                                  XXH64_freeState);
+    XXH64_reset(state.get(), 0);
+    std::error_code ignored;
+    std::ifstream file;
+    if (std::filesystem::is_regular_file(path, ignored)) file.open(path, std::ios::binary);
+    std::vector<char> buffer(1 << 20);
+    while (file.is_open() && file) {
+        file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+        XXH64_update(state.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
+    }
+    return hex(XXH64_digest(state.get()));
+}
+
+// Of the program that runs, also where its file has been replaced meanwhile.
+const std::string& ownHash() {
+    static const std::string hash = hashOfFile("/proc/self/exe");
+    return hash;
+}
+
 }  // namespace
 
 InputsHash::InputsHash(const CLI::App& app, const std::set<std::string>& files) {
     add("program",
         app.get_parent() == nullptr ? app.get_name() : app.get_parent()->get_name() + " " + app.get_name());
-    add("version", VARIOLUX_VERSION);
+    add("program", ownHash());
     for (const CLI::Option* option : app.get_options([](const CLI::Option*) { return true; })) {
         const std::string name = option->get_single_name();
         const std::string full = option->get_positional() ? name : "--" + name;
@@ -67,18 +89,7 @@ void InputsHash::addBytes(const std::string& bytes) { folded_ += hex(XXH64(bytes
 void InputsHash::addFile(const std::string& path) {
     if (path.empty()) return;
     files_.push_back({path, identityOf(path)});
-    const std::unique_ptr<XXH64_state_t, XXH_errorcode (*)(XXH64_state_t*)> state(XXH64_createState(),
-                                                                                  XXH64_freeState);
-    XXH64_reset(state.get(), 0);
-    std::error_code ignored;
-    std::ifstream file;
-    if (std::filesystem::is_regular_file(path, ignored)) file.open(path, std::ios::binary);
-    std::vector<char> buffer(1 << 20);
-    while (file.is_open() && file) {
-        file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-        XXH64_update(state.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
-    }
-    folded_ += hex(XXH64_digest(state.get()));
+    folded_ += hashOfFile(path);
 }
 
 void InputsHash::checkUnchanged() const {
@@ -103,10 +114,21 @@ bool isFinished(const std::vector<std::string>& outputs, const std::string& inpu
     return true;
 }
 
+std::string inputsOf(const CLI::App& app, const std::set<std::string>& fileOptions,
+                     const std::vector<std::string>& files) {
+    InputsHash hash(app, fileOptions);
+    for (const std::string& file : files) {
+        hash.add("file", file.empty() ? "none" : "given");  // which of them
+        hash.addFile(file);
+    }
+    return hash.text();
+}
+
 void addOverwrite(CLI::App& app, bool& overwrite) {
-    app.add_flag("--overwrite", overwrite,
-                 "Run even if the output is there and was made by this version of the program from the same "
-                 "inputs with the same parameters, which is else skipped");
+    app.add_flag(
+        "--overwrite", overwrite,
+        "Run even if the output is there and was made by this very program from the same inputs with "
+        "the same parameters, which is else skipped");
 }
 
 }  // namespace vlx

@@ -15,7 +15,8 @@ namespace vlx {
 /// Hash (XXH64) of all that a run's result depends on.
 class InputsHash {
   public:
-    /// Of the program's name and version and every option of its command line but those that change no pixel
+    /// Of the program (its name and what is in its own file: one that was built anew from other sources does
+    /// its work anew, a copy does not) and every option of its command line but those that change no pixel
     /// (--threads, --log, --json, ...), the names of outputs, --band and --frames, and `files`: options that
     /// name input files, which count by what is in them, through addFile(). An option that is not given
     /// counts by its default.
@@ -47,6 +48,11 @@ class InputsHash {
 /// Whether all `outputs` are there, and those that are EXR images say that they are made of `inputs`. If so,
 /// it is said on standard error, unless the run is quiet.
 bool isFinished(const std::vector<std::string>& outputs, const std::string& inputs);
+
+/// The hash of a command whose result depends on its options and on what is in `files`, which `fileOptions`
+/// name.
+std::string inputsOf(const CLI::App& app, const std::set<std::string>& fileOptions,
+                     const std::vector<std::string>& files);
 
 /// Adds the option --overwrite.
 void addOverwrite(CLI::App& app, bool& overwrite);

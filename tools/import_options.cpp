@@ -1,5 +1,7 @@
 #include "import_options.h"
 
+#include <algorithm>
+
 #include "tool_main.h"
 
 namespace vlx {
@@ -59,15 +61,8 @@ void MomentFlags::bind(CLI::App& app, const std::string& group) {
     bindCompanions(app, options_.with);
     bindSamples(app, options_.samples);
     bindMap(app, mappings_);
-    bound_ = app.get_options();
-    bound_.erase(bound_.begin(), bound_.begin() + static_cast<std::ptrdiff_t>(before.size()));
-    for (CLI::Option* option : bound_) option->group(group);
-}
-
-std::string MomentFlags::given(bool mapCounts) const {
-    for (const CLI::Option* option : bound_)
-        if (option->count() > 0 && (mapCounts || option->get_name() != "--map")) return option->get_name();
-    return {};
+    for (CLI::Option* option : app.get_options())
+        if (std::ranges::find(before, option) == before.end()) option->group(group);
 }
 
 MomentOptions MomentFlags::options() const {

@@ -26,8 +26,6 @@ class MomentFlags {
     void bind(CLI::App& app, const std::string& group = "Options");
     /// What was chosen, with the mappings.
     MomentOptions options() const;
-    /// One of these options that was given, --map only where it counts; else empty.
-    std::string given(bool mapCounts) const;
     /// The files named besides the image itself; empty names for none.
     std::vector<std::string> files() const;
     std::vector<std::string*> fileNames();
@@ -36,7 +34,6 @@ class MomentFlags {
     enum class Meaning { Preset, Sample, Mean, Second };
     enum class Colours { Preset, Rgb, Xyz };
 
-    std::vector<CLI::Option*> bound_;
     MomentOptions options_;
     Meaning meaning_ = Meaning::Preset;
     Colours colours_ = Colours::Preset;

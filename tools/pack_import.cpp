@@ -2,7 +2,10 @@
 
 #include <iostream>
 #include <memory>
+#include <set>
+#include <vector>
 
+#include "finished.h"
 #include "import_options.h"
 #include "pack_commands.h"
 #include "progress_bar.h"
@@ -21,11 +24,22 @@ struct ImportCommand {
     std::string dump;
     std::string renderer;
     DumpCompression compression = DumpCompression::Zips;
+    bool overwrite = false;
+    const CLI::App* commandLine = nullptr;
+    std::string inputs;  // what the dump says that it is made of
 
     void bindOutput(CLI::App& app) {
+        commandLine = &app;
         app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
         app.add_option("--renderer", renderer, "Name of the renderer, if the files do not tell");
         addCompression(app, compression);
+        addOverwrite(app, overwrite);
+    }
+    // Whether the dump is there and made of these files, which `fileOptions` name.
+    bool finished(const std::set<std::string>& fileOptions, const std::vector<std::string>& files) {
+        checkOutputName(dump, files);
+        inputs = inputsOf(*commandLine, fileOptions, files);
+        return !overwrite && isFinished({dump}, inputs);
     }
     int print(const ImportReport& report, const std::string& what) const {
         if (isQuiet()) return kDone;
@@ -77,9 +91,9 @@ struct StackCommand : ImportCommand {
     }
 
     int run() {
-        const StackOptions options{preset, parseMappings(mappings), radiance, renderer, compression};
         images = expandSequences(images);
-        checkOutputName(dump, images);
+        if (finished({"IMAGE"}, images)) return kDone;
+        const StackOptions options{preset, parseMappings(mappings), radiance, renderer, compression, inputs};
         ImportReport report;
         {
             ProgressBar bar("stacking");
@@ -115,8 +129,11 @@ struct BuffersCommand : ImportCommand {
         options.map = parseMappings(mappings);
         options.renderer = renderer;
         options.compression = compression;
-        checkOutputName(dump, {a, b, options.with.variance, options.with.albedo, options.with.normal,
-                               options.with.depth});
+        const CompanionImages& with = options.with;
+        if (finished({"A", "B", "--variance", "--albedo", "--normal", "--depth"},
+                     {a, b, with.variance, with.albedo, with.normal, with.depth}))
+            return kDone;
+        options.inputs = inputs;
         ImportReport report;
         {
             ProgressBar bar("joining");
@@ -156,6 +173,8 @@ struct MomentsCommand : ImportCommand {
     }
 
     int run() {
+        checkOptionUse(*commandLine, {{{"--seed"}, {"artificial halves, without --single"}}},
+                       {single ? "" : "artificial halves, without --single"});
         MomentOptions options = flags.options();
         options.radiance = radiance;
         options.renderer = renderer;
@@ -164,7 +183,8 @@ struct MomentsCommand : ImportCommand {
         options.seed = seed;
         std::vector<std::string> files = flags.files();
         files.push_back(image);
-        checkOutputName(dump, files);
+        if (finished({"IMAGE", "--variance", "--albedo", "--normal", "--depth"}, files)) return kDone;
+        options.inputs = inputs;
         ImportReport report;
         {
             ProgressBar bar("reading");
@@ -200,13 +220,21 @@ struct BcdCommand : ImportCommand {
         options.renderer = renderer;
         options.compression = compression;
         options.halves = !single;
-        checkOutputName(dump, files);
         const bool raw = !isOpenExr(files.front());
         if (raw != (files.size() == 1))
             throw CLI::ValidationError("FILE",
                                        raw ? "expected one raw file or images, found several files that "
                                              "start with a raw one"
                                            : "expected an image and its covariances, found one image");
+        const char* const halves = "statistics in artificial halves, without --single";
+        checkOptionUse(*commandLine,
+                       {{{"--samples"}, {"statistics without a histogram"}},
+                        {{"--single"}, {"statistics"}},
+                        {{"--seed"}, {halves}}},
+                       {raw ? "" : "statistics", files.size() == 2 ? "statistics without a histogram" : "",
+                        raw || single ? "" : halves});
+        if (finished({"FILE"}, files)) return kDone;
+        options.inputs = inputs;
         ImportReport report;
         {
             ProgressBar bar("reading");
@@ -234,7 +262,8 @@ struct SbmcCommand : ImportCommand {
         SbmcOptions options;
         if (!renderer.empty()) options.renderer = renderer;
         options.compression = compression;
-        checkOutputName(dump, tiles);
+        if (finished({"TILE"}, tiles)) return kDone;
+        options.inputs = inputs;
         ImportReport report;
         {
             ProgressBar bar("reading");

@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -96,6 +98,20 @@ int badUsage(const CLI::App& app, const std::string& message) {
     return kBadUsage;
 }
 
+// Where a name leads that need not exist yet, through symbolic links.
+std::filesystem::path resolved(std::filesystem::path path) {
+    std::error_code failed;
+    for (int links = 0; links < 40 && std::filesystem::is_symlink(path, failed); ++links)
+        path = path.parent_path() / std::filesystem::read_symlink(path, failed);
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, failed), failed);
+}
+
+bool sameFile(const std::string& a, const std::string& b) {
+    if (a.empty() || b.empty()) return false;
+    std::error_code ignored;
+    return std::filesystem::equivalent(a, b, ignored) || resolved(a) == resolved(b);
+}
+
 std::vector<CLI::App*> allOf(CLI::App& app) {
     std::vector<CLI::App*> all = {&app};
     for (CLI::App* const command : app.get_subcommands([](CLI::App*) { return true; }))
@@ -178,13 +194,40 @@ void warn(const std::string& text) {
         std::fprintf(stderr, "%s\n", printable(text).c_str());
 }
 
+void checkOutputs(const std::vector<NamedFile>& outputs, const std::vector<std::string>& inputs) {
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+        for (const std::string& input : inputs)
+            if (sameFile(outputs[i].path, input))
+                throw CLI::ValidationError(outputs[i].option,
+                                           "expected another file than the input '" + input + "'");
+        for (std::size_t j = 0; j < i; ++j)
+            if (sameFile(outputs[i].path, outputs[j].path))
+                throw CLI::ValidationError(outputs[i].option, "expected another file than that of " +
+                                                                  outputs[j].option + ", found '" +
+                                                                  outputs[i].path + "'");
+    }
+}
+
 void checkOutputName(const std::string& output, const std::vector<std::string>& inputs) {
     if (std::filesystem::path(output).extension() != ".exr")
         throw CLI::ValidationError("--output", "expected a name that ends with .exr, found '" + output + "'");
-    std::error_code ignored;
-    for (const std::string& input : inputs)
-        if (std::filesystem::equivalent(input, output, ignored))
-            throw CLI::ValidationError("--output", "expected another file than the input '" + input + "'");
+    checkOutputs({{"--output", output}}, inputs);
+}
+
+void checkOptionUse(const CLI::App& app, const std::vector<OptionUse>& uses,
+                    const std::vector<std::string>& atHand) {
+    for (const OptionUse& use : uses) {
+        const bool read = std::ranges::any_of(use.modes, [&](const std::string& mode) {
+            return std::ranges::find(atHand, mode) != atHand.end();
+        });
+        for (const std::string& option : use.options) {
+            if (read || app.get_option(option)->count() == 0) continue;
+            std::string modes;
+            for (std::size_t i = 0; i < use.modes.size(); ++i)
+                modes += (i == 0 ? "" : i + 1 == use.modes.size() ? " or " : ", ") + use.modes[i];
+            throw CLI::ValidationError(option + " goes with " + modes + ": here nothing reads it");
+        }
+    }
 }
 
 }  // namespace vlx

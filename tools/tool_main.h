@@ -41,9 +41,30 @@ void warn(const std::string& text);
 /// Whether --quiet was given: a tool then prints errors and what its other options ask for, nothing else.
 bool isQuiet();
 
-/// Throws CLI::ValidationError (exit 2) unless `output` ends with .exr and is another file than each of
-/// `inputs`: what would otherwise cost the input, or be found out after hours of work.
+/// A file, and the option or what else it is named by.
+struct NamedFile {
+    std::string option;
+    std::string path;
+};
+
+/// Throws CLI::ValidationError (exit 2) when an output is the same file as an input or as another output,
+/// whatever they are called (./a.exr, symbolic and hard links): one of them would be lost. Empty names are no
+/// files.
+void checkOutputs(const std::vector<NamedFile>& outputs, const std::vector<std::string>& inputs);
+
+/// The same of a single output, --output, whose name must end with .exr.
 void checkOutputName(const std::string& output, const std::vector<std::string>& inputs);
+
+/// Options that only some modes of a program read, modes in the user's words: "--method krige".
+struct OptionUse {
+    std::vector<std::string> options;
+    std::vector<std::string> modes;
+};
+
+/// Throws CLI::ValidationError (exit 2), naming the option and the modes, when one was given that none of the
+/// modes `at hand` reads: silence would let the user believe that it did something.
+void checkOptionUse(const CLI::App& app, const std::vector<OptionUse>& uses,
+                    const std::vector<std::string>& atHand);
 
 /// Binds an option whose value is one of a few names. Anything else is bad usage, with the names listed.
 template <class Enum>

@@ -188,6 +188,14 @@ int run(const Options& options) {
     picture.exposure = options.exposure;
     for (const std::string& text : options.crops)
         picture.crops.push_back(parsed("--crop", [&] { return parseCrop(text); }));
+    if (!options.pictures.empty()) {
+        std::vector<NamedFile> pictures;
+        for (const char* name : {"side_by_side", "crops", "signed_error", "relative_error"})
+            pictures.push_back({"--pictures", options.pictures + "/" + name + ".png"});
+        std::vector<std::string> inputs = options.images;
+        inputs.push_back(options.reference);
+        checkOutputs(pictures, inputs);
+    }
     const ThreadLimit threads(options.threads);
 
     const Input reference = readInput(options.reference, options, options.referenceStddev);

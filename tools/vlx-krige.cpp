@@ -22,6 +22,8 @@
 #include "variolux/compare/gaussian.h"
 #include "variolux/dump/bcd.h"
 #include "variolux/dump/image_layers.h"
+#include "variolux/dump/layers.h"
+#include "variolux/dump/positions.h"
 #include "variolux/dump/reader.h"
 #include "variolux/reconstruct/drift_kriging.h"
 #include "variolux/reconstruct/mean.h"
@@ -45,6 +47,8 @@ struct Options {
     std::string band;
     std::string samplingMap;
     bool noFeatures = false;
+    vlx::PositionConvention positions = vlx::PositionConvention::Raster;
+    bool layersAreSamples = false;
     double sigma = 1;
     vlx::PaperOptions paper;
     bool noColourDistance = false;
@@ -75,7 +79,8 @@ void bind(CLI::App& app, Options& o) {
            "--template", o.layersOf,
            "Put the result into a copy of this flat OpenEXR file of the same size, as of a flat input")
         ->option_text("IMAGE");
-    app.add_flag("--drop-layers", o.dropLayers, "Of a flat image: write only what is denoised, and stddev");
+    app.add_flag("--drop-layers", o.dropLayers, "Of a flat image: write only what is denoised, and stddev")
+        ->excludes("--template");
     vlx::addChoice(
         app, "--method", o.method,
         {{"krige", Method::Krige},
@@ -122,6 +127,16 @@ void bind(CLI::App& app, Options& o) {
          {"blackman-harris", vlx::PixelFilter::BlackmanHarris}},
         "krige: pixel filter of the result. box: averages over pixels; gaussian: standard deviation "
         "0.5, radius 1.5; blackman-harris: radius 1.5 pixels");
+    std::vector<std::pair<std::string, vlx::PositionConvention>> conventions;
+    for (const auto& known : vlx::positionConventions())
+        conventions.emplace_back(known.name, known.convention);
+    vlx::addChoice(
+        app, "--positions", o.positions, conventions,
+        "What sample.x and sample.y of the dump are, where they are used (--scale, --filter, paper). "
+        "raster: pixels, downwards; others are recognised and told");
+    app.add_flag(
+        "--layers-are-samples", o.layersAreSamples,
+        "Average the samples of a dump that looks like a deep image of layers, which is else refused");
     app.add_option(
            "--band", o.band,
            "krige: only band I of N, cut by rows from the top: the same pixels, bit for bit, that the "
@@ -181,14 +196,53 @@ void bind(CLI::App& app, Options& o) {
         "get their mean and are counted.");
 }
 
+const std::vector<vlx::OptionUse>& usesByMethod() {
+    static const std::vector<vlx::OptionUse> uses = {
+        {{"--quality", "--fireflies", "--strength", "--feature", "--radiance", "--scale", "--filter",
+          "--band", "--no-features", "--max-memory"},
+         {"--method krige"}},
+        {{"--clamp"}, {"--fireflies clamp"}},
+        {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
+        {{"--sigma"}, {"--method gaussian"}},
+        {{"--region", "--whole-image", "--no-colour-distance", "--diagnostics"}, {"--method paper"}},
+        {{"--inspect"}, {"--diagnostics"}},
+        {{"--positions"},
+         {"--method paper", "--scale 2 to 4", "--filter gaussian", "--filter blackman-harris"}}};
+    return uses;
+}
+
+const std::vector<vlx::OptionUse>& usesByInput() {
+    static const std::vector<vlx::OptionUse> uses = {
+        {{"--preset", "--variance-is", "--variance-of", "--variance", "--albedo", "--normal", "--depth",
+          "--samples", "--drop-layers"},
+         {"a flat image"}},
+        {{"--map"}, {"a flat image", "--template"}},
+        {{"--layers-are-samples", "--positions"}, {"a dump"}}};
+    return uses;
+}
+
+void checkMethodOptions(const Options& o) {
+    std::vector<std::string> atHand;
+    for (const char* option : {"--method", "--fireflies", "--filter"})
+        atHand.push_back(std::string(option) + " " + o.commandLine->get_option(option)->as<std::string>());
+    if (o.krige.scale > 1) atHand.emplace_back("--scale 2 to 4");
+    if (o.diagnostics) atHand.emplace_back("--diagnostics");
+    vlx::checkOptionUse(*o.commandLine, usesByMethod(), atHand);
+}
+
 // The samples of a dump, or those that the moments of a flat image stand for.
 std::unique_ptr<vlx::SampleSource> openInput(const Options& o, bool flat) {
     if (!flat) {
         auto dump = std::make_unique<vlx::DumpReader>(o.input);
-        const std::string given = o.dropLayers ? "--drop-layers" : o.moments.given(o.layersOf.empty());
-        if (!given.empty()) throw CLI::ValidationError(given + " goes with a flat image");
+        vlx::checkOptionUse(*o.commandLine, usesByInput(),
+                            {"a dump", o.layersOf.empty() ? "" : "--template"});
+        if (const std::string by = o.layersAreSamples ? "" : vlx::layersFoundBy(*dump); !by.empty())
+            throw vlx::Error(o.input, "expected samples of the camera, found layers to be composited (" + by +
+                                          "), whose average is no image: flatten it where it was made, or "
+                                          "average them all the same with --layers-are-samples");
         return dump;
     }
+    vlx::checkOptionUse(*o.commandLine, usesByInput(), {"a flat image"});
     vlx::MomentOptions options = o.moments.options();
     options.radiance = o.krige.radiance;
     for (const std::string& feature : o.krige.features) options.map.try_emplace(feature, feature);
@@ -270,6 +324,11 @@ std::pair<int, int> parsePixel(const std::string& text) {
     return {x, y};
 }
 
+std::string inWords(const vlx::Window& w) {
+    return "columns " + std::to_string(w.x) + " to " + std::to_string(w.x + (w.width - 1)) + " and rows " +
+           std::to_string(w.y) + " to " + std::to_string(w.y + (w.height - 1));
+}
+
 /// "2G", "500M".
 std::uint64_t parseMemory(const std::string& text) {
     double value = 0;
@@ -312,14 +371,13 @@ void tell(const vlx::SampleSource& source, const std::string& original, const vl
 }
 
 void kriged(const Options& o, const vlx::Progress& progress) {
-    if (!o.samplingMap.empty()) {
-        vlx::checkOutputName(o.samplingMap, {o.input, o.image, o.layersOf});
-        if (o.samplingMap == o.image)
-            throw CLI::ValidationError("--sampling-map", "expected another name than the output's");
-    }
     std::vector<std::string> files = o.moments.files();
     files.insert(files.end(), {o.input, o.layersOf});
     vlx::checkOutputName(o.image, files);
+    const std::string diagnosticsName = o.diagnostics ? o.image + ".json" : "";
+    vlx::checkOutputs(
+        {{"--output", o.image}, {"--diagnostics", diagnosticsName}, {"--sampling-map", o.samplingMap}},
+        files);
     const bool flat = vlx::isFlatImage(o.input);
     // What the result becomes a part of.
     std::string original = o.layersOf;
@@ -329,6 +387,9 @@ void kriged(const Options& o, const vlx::Progress& progress) {
             "--band, --scale and --max-memory go with --drop-layers or a dump, without --template");
     vlx::ImageWriteOptions write;
     write.attributes["Software"] = "vlx-krige";
+    if (!o.samplingMap.empty() && !o.samplingMap.ends_with(".exr"))
+        throw CLI::ValidationError("--sampling-map",
+                                   "expected a name that ends with .exr, found '" + o.samplingMap + "'");
     vlx::InputsHash hash(*o.commandLine,
                          {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"});
     for (const std::string& file : files) {
@@ -338,15 +399,23 @@ void kriged(const Options& o, const vlx::Progress& progress) {
     const std::string inputs = write.attributes[vlx::kInputsAttribute] = hash.text(o.krige.band);
     std::vector<std::string> outputs = {o.image};
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
-    if (o.diagnostics) outputs.push_back(o.image + ".json");
+    if (o.diagnostics) outputs.push_back(diagnosticsName);
     if (!o.overwrite && vlx::isFinished(outputs, inputs)) {
         if (o.json) std::printf("{\"skipped\": true}\n");
         return;
     }
     { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
     const std::unique_ptr<vlx::SampleSource> source = openInput(o, flat);
-    const vlx::SampleSource& dump = *source;
-    const vlx::ChannelMap replaced = original.empty() ? vlx::ChannelMap() : replacedLayers(o, original, dump);
+    const bool usesPositions =
+        o.method == Method::Paper || o.krige.scale > 1 || o.filter != vlx::PixelFilter::Box;
+    const vlx::PositionedSamples dump(*source, o.positions, usesPositions);
+    for (const auto& [x, y] : o.paper.inspect)
+        if (!dump.header().data.contains(x, y))
+            throw CLI::ValidationError("--inspect", "expected a pixel of the picture, " +
+                                                        inWords(dump.header().data) + ", found " +
+                                                        std::to_string(x) + "," + std::to_string(y));
+    const vlx::ChannelMap replaced =
+        original.empty() ? vlx::ChannelMap() : replacedLayers(o, original, *source);
     vlx::LayerCopy copied;
     vlx::ReconstructionReport report;
     if (original.empty() && o.method == Method::Krige && o.filter == vlx::PixelFilter::Box &&
@@ -364,7 +433,7 @@ void kriged(const Options& o, const vlx::Progress& progress) {
         if (o.diagnostics) vlx::addDiagnosticLayers(result);
         // Both files or none: the image gets its name only when the JSON is complete.
         std::optional<vlx::OutputFile> diagnostics;
-        if (o.diagnostics) writeText(diagnostics.emplace(o.image + ".json"), vlx::toJson(result));
+        if (o.diagnostics) writeText(diagnostics.emplace(diagnosticsName), vlx::toJson(result));
         if (original.empty())
             vlx::writeImage(o.image, result.image, write);
         else
@@ -377,7 +446,14 @@ void kriged(const Options& o, const vlx::Progress& progress) {
         if (!o.samplingMap.empty()) vlx::writeImage(o.samplingMap, map, write);
         report = std::move(result.report);
     }
-    tell(dump, original, copied, o.json);
+    tell(*source, original, copied, o.json);
+    if (const std::string text = vlx::toText(dump.report()); !text.empty()) {
+        std::string advice;
+        for (const auto& known : vlx::positionConventions())
+            if (dump.report().likely == known.convention)
+                advice = " (--positions " + known.name + " reads them so)";
+        vlx::say(o.input + ": WARNING: " + text + advice);
+    }
     if (o.json) {
         std::printf("%s\n", vlx::toJson(report).c_str());
     } else if (std::string text = vlx::toText(report); !text.empty()) {
@@ -387,29 +463,19 @@ void kriged(const Options& o, const vlx::Progress& progress) {
 }
 
 int run(Options& o) {
+    checkMethodOptions(o);
     o.paper.colourDistance = !o.noColourDistance;
     if (o.wholeImage) o.paper.regionSize = 0;
     o.krige.standardFeatures = !o.noFeatures;
     if (!o.band.empty()) {
-        if (o.method != Method::Krige) throw CLI::ValidationError("--band goes with --method krige");
         o.krige.band = vlx::parseBand(o.band);
         if (o.filter != vlx::PixelFilter::Box)  // it reaches into the bands beside
             throw CLI::ValidationError("--band goes with --filter box");
     }
-    if (o.method != Method::Krige && (o.filter != vlx::PixelFilter::Box || o.krige.scale != 1))
-        throw CLI::ValidationError("--filter and --scale go with --method krige");
-    if (!o.inspect.empty() && !o.diagnostics) throw CLI::ValidationError("--inspect goes with --diagnostics");
     for (const std::string& text : o.inspect) o.paper.inspect.push_back(parsePixel(text));
-    if (o.method != Method::Paper && (o.diagnostics || o.noColourDistance || o.wholeImage))
-        throw CLI::ValidationError(
-            "--diagnostics, --no-colour-distance and --whole-image go with --method paper");
-
-    if (!o.samplingMap.empty() && o.method == Method::Gaussian)
-        throw CLI::ValidationError("--sampling-map does not go with --method gaussian");
     if (!o.maxMemory.empty()) {
-        if (o.method != Method::Krige || o.filter != vlx::PixelFilter::Box || !o.samplingMap.empty())
-            throw CLI::ValidationError(
-                "--max-memory goes with --method krige, --filter box and no --sampling-map");
+        if (o.filter != vlx::PixelFilter::Box || !o.samplingMap.empty())
+            throw CLI::ValidationError("--max-memory goes with --filter box and no --sampling-map");
         o.krige.maxMemory = parseMemory(o.maxMemory);
 #ifdef __GLIBC__
         mallopt(M_MMAP_THRESHOLD, 1 << 20);  // what is done with is given back

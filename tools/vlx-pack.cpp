@@ -42,16 +42,19 @@ struct InfoCommand {
 struct SampleCommand {
     std::string image;
     std::string dump;
+    bool overwrite = false;
     vlx::PointOptions options;
+    const CLI::App* commandLine = nullptr;
 
     void bind(CLI::App& app) {
+        commandLine = &app;
         app.description(
             "Sample an image at a few Sobol points, to see what kriging makes of them: the paper's figure "
             "1.");
         app.footer(
             "Example:\n"
             "  vlx-pack sample picture.png -o points.exr --points 64\n"
-            "  vlx-krige points.exr -o kriged.exr --whole-image --no-colour-distance");
+            "  vlx-krige points.exr -o kriged.exr --method paper --whole-image --no-colour-distance");
         app.add_option("IMAGE", image, "A flat image with R, G, B")->required();
         app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
         app.add_option("--points", options.points, "How many")
@@ -61,10 +64,13 @@ struct SampleCommand {
         app.add_option("--seed", options.seed, "Of the scrambling")
             ->needs("--scramble")
             ->capture_default_str();
+        vlx::addOverwrite(app, overwrite);
     }
 
-    int run() const {
+    int run() {
         vlx::checkOutputName(dump, {image});
+        options.inputs = vlx::inputsOf(*commandLine, {}, {image});
+        if (!overwrite && vlx::isFinished({dump}, options.inputs)) return vlx::kDone;
         vlx::sampleAtPoints(image, dump, options);
         return vlx::kDone;
     }
@@ -73,9 +79,12 @@ struct SampleCommand {
 struct SubsetCommand {
     std::string input;
     std::string dump;
+    bool overwrite = false;
     vlx::SubsetOptions options;
+    const CLI::App* commandLine = nullptr;
 
     void bind(CLI::App& app) {
+        commandLine = &app;
         app.description(
             "Write a dump of fewer samples a pixel, as if the renderer had stopped earlier. Where samples "
             "belong\nto replicates (sample.replicate), whole replicates are kept.");
@@ -95,10 +104,13 @@ struct SubsetCommand {
         app.add_option("--seed", options.seed, "Another seed, another division into sub-sets")
             ->capture_default_str();
         vlx::addCompression(app, options.compression);
+        vlx::addOverwrite(app, overwrite);
     }
 
-    int run() const {
+    int run() {
         vlx::checkOutputName(dump, {input});
+        options.inputs = vlx::inputsOf(*commandLine, {"DUMP"}, {input});
+        if (!overwrite && vlx::isFinished({dump}, options.inputs)) return vlx::kDone;
         vlx::ProgressBar bar("dividing");
         vlx::subsetDump(input, dump, options, bar);
         return vlx::kDone;
@@ -144,9 +156,7 @@ struct MergeCommand {
     std::string inputs() const {
         const std::string whole = options.crop ? std::string() : vlx::wholeInputs(parts);
         if (!whole.empty()) return whole;
-        vlx::InputsHash hash(*commandLine, {"PART"});
-        for (const std::string& part : parts) hash.addFile(part);
-        return hash.text();
+        return vlx::inputsOf(*commandLine, {"PART"}, parts);
     }
 };
 

@@ -197,6 +197,7 @@ struct TraceCommand {
     int run() {
         const bool renders = !listCameras && explain.empty();
         if (dump.empty() && renders) throw CLI::RequiredError("--output");
+        checkOptions();
         if (!band.empty()) options.band = vlx::parseBand(band);
         const vlx::ThreadLimit limit(threads);
         vlx::ProgressBar bar("tracing");
@@ -209,6 +210,20 @@ struct TraceCommand {
     }
 
   private:
+    // What is printed and no dump made would else seem to depend on them.
+    void checkOptions() const {
+        const std::string trace = "tracing", explaining = "--explain";
+        const std::string atHand = listCameras ? "--list-cameras" : explain.empty() ? trace : explaining;
+        vlx::checkOptionUse(
+            *commandLine,
+            {{{"--output", "--overwrite", "--compression", "--json", "--band"}, {trace}},
+             {{"--camera", "--width", "--height", "--crop", "--spp", "--hierarchical", "--tolerance",
+               "--time", "--replicates", "--target-error", "--append", "--sample-map", "--seed",
+               "--max-bounces", "--effects", "--integrator", "--explain"},
+              {trace, explaining}}},
+            {atHand});
+    }
+
     TraceCommand ofFrame(int number) const {
         TraceCommand one = *this;
         for (std::string* name :
@@ -222,7 +237,11 @@ struct TraceCommand {
     /// What --frames leaves of a run: one picture.
     int runOne(const vlx::Progress& progress) {
         const bool renders = !listCameras && explain.empty();
-        if (renders) vlx::checkOutputName(dump, {scene, earlierPath, mapPath});
+        if (renders) {
+            std::vector<std::string> files = gltfFiles(scene);
+            files.insert(files.end(), {scene, environment.image, earlierPath, mapPath});
+            vlx::checkOutputName(dump, files);
+        }
         std::string broken;
         const auto request = parseEffects(effects, broken);
         if (!request) throw CLI::ValidationError("--effects", broken);

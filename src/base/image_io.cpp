@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "variolux/base/error.h"
+#include "variolux/base/memory.h"
 #include "variolux/base/output_file.h"
 
 namespace vlx {
@@ -43,6 +44,17 @@ Image readImage(const std::string& path) {
     const auto values = static_cast<std::int64_t>(spec.image_pixels()) * spec.nchannels;
     if (values > std::numeric_limits<std::int32_t>::max())
         throw Error(path, "expected at most 2^31 values, found " + std::to_string(values));
+
+    // A small file cannot hold a huge image, whatever its header says. zlib makes at most 1032 bytes of one,
+    // of an area of one colour lossy compressions many more.
+    const bool exr = std::string_view(input->format_name()) == "openexr";
+    const bool lossy = !exr || std::string(spec.get_string_attribute("compression")).starts_with("dwa");
+    const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path, status));
+    const std::int64_t most = bytes * (lossy ? 1 << 16 : 1 << 11) + (1 << 20);
+    if (values > most)
+        throw Error(path, "truncated or damaged: its header claims " + std::to_string(values) +
+                              " values, more than the file's " + std::to_string(bytes) + " bytes can hold");
+    requireMemory(path, static_cast<std::uint64_t>(values) * sizeof(float), "an image held whole");
 
     Image image(Window{spec.x, spec.y, spec.width, spec.height}, spec.channelnames);
     image.display = Window{spec.full_x, spec.full_y, spec.full_width, spec.full_height};

@@ -60,7 +60,10 @@ bool collect(const Pipe& out, const Pipe& err, ProcessRun& run) {
     std::array<pollfd, 2> waiting{pollfd{out.readEnd.get(), POLLIN, 0}, pollfd{err.readEnd.get(), POLLIN, 0}};
     std::array<char, 65536> buffer{};
     while (waiting[0].fd >= 0 || waiting[1].fd >= 0) {
-        if (::poll(waiting.data(), waiting.size(), -1) < 0 && errno != EINTR) return false;
+        if (::poll(waiting.data(), waiting.size(), -1) < 0) {
+            if (errno == EINTR) continue;  // revents are those of the call before
+            return false;
+        }
         for (std::size_t i = 0; i < waiting.size(); ++i) {
             if (waiting[i].fd < 0 || waiting[i].revents == 0) continue;
             const ssize_t count = ::read(waiting[i].fd, buffer.data(), buffer.size());

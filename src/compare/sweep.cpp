@@ -92,7 +92,7 @@ class Runner {
         fs::create_directories(options_.folder + "/images", status);
         fs::create_directories(scratch(), status);
         if (status) throw Error(options_.folder, "expected to make this folder: " + status.message());
-        ResultsFile results(options_.folder + "/results.jsonl");
+        ResultsFile results(options_.folder + "/results.jsonl", options_.overwrite);
         results_ = &results;
         total_ = countSteps();
         for (int seed = 1; seed <= options_.seeds; ++seed)

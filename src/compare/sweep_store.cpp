@@ -57,7 +57,7 @@ ResultsFile::Descriptor::~Descriptor() {
     if (value >= 0) ::close(value);
 }
 
-ResultsFile::ResultsFile(const std::string& path) : path_(path) {
+ResultsFile::ResultsFile(const std::string& path, bool anew) : path_(path) {
     const auto fail = [&] { throw Error(path, std::string("cannot be written: ") + std::strerror(errno)); };
     fd_.value = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (fd_.value < 0) fail();
@@ -69,6 +69,10 @@ ResultsFile::ResultsFile(const std::string& path) : path_(path) {
         complete += line.size() + 1;
         const SweepRecord record = parseRecord(line, path);
         records_[record.key] = record;
+    }
+    if (anew) {
+        records_.clear();
+        complete = 0;
     }
     if (::ftruncate(fd_.value, static_cast<off_t>(complete)) != 0 || ::lseek(fd_.value, 0, SEEK_END) < 0)
         fail();

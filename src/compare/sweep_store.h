@@ -22,8 +22,9 @@ std::string fileIdentity(const std::string& path);
 class ResultsFile {
   public:
     /// Cuts off a last line without its end, which was being written when a sweep died. Throws Error when
-    /// another process holds the file, or another line is no record; it is then left as it is.
-    explicit ResultsFile(const std::string& path);
+    /// another process holds the file, or another line is no record; it is then left as it is. `anew`: starts
+    /// with none of its records.
+    explicit ResultsFile(const std::string& path, bool anew = false);
 
     /// The last record of this key, unless it is a failure's.
     const SweepRecord* find(const std::string& key) const;

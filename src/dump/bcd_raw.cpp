@@ -70,6 +70,7 @@ ImportReport importBcdRaw(const std::string& raw, const std::string& dump, const
     header.renderer = options.renderer;
     header.samples = source.samples;
 
+    setInputs(header, options.inputs);
     DumpWriter writer(dump, header);
     const auto channels = static_cast<std::uint64_t>(source.channels);
     const std::uint64_t rowSamples = std::uint64_t(source.width) * std::uint64_t(source.samples);

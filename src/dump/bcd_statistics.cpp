@@ -56,12 +56,15 @@ ImportReport importBcdStatistics(const std::string& image, const std::string& co
         report.notes.push_back("The number of samples of each pixel comes from " + binName(bins - 1) +
                                " of the histogram.");
     } else if (!(options.samples >= 1)) {
-        throw Error(covariance, "expected the number of samples a pixel, or the histogram that has it");
+        throw Error(covariance,
+                    "expected the number of samples a pixel (--samples N), or a third file, the histogram "
+                    "that has it");
     }
     report.notes.push_back("The covariances are those of single samples.");
-    const MomentRows samples(std::move(opened), std::move(source),
-                             {options.renderer, options.halves, options.seed, options.compression},
-                             std::move(report));
+    const MomentRows samples(
+        std::move(opened), std::move(source),
+        {options.renderer, options.halves, options.seed, options.compression, options.inputs},
+        std::move(report));
     writeSamples(samples, dump, progress);
     return samples.report();
 }

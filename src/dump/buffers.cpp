@@ -77,6 +77,7 @@ ImportReport importBuffers(const std::string& a, const std::string& b, const std
     }
 
     Agreement agreement;
+    setInputs(header, options.inputs);
     DumpWriter writer(dump, header);
     const int bandRows = images.bandRows(header.channels.size() * 2);
     for (int row = 0; row < header.data.height;) {

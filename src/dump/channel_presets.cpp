@@ -30,6 +30,7 @@ ChannelMap plainMap(const Names& names) {
     ChannelMap map;
     for (const auto& channel : standardChannels())
         if (channel.name != kReplicate && contains(names, channel.name)) map[channel.name] = channel.name;
+    if (!findTriple(names, {""})) enter(map, "", findLuminance(names, {""}));
     return map;
 }
 
@@ -92,6 +93,13 @@ std::optional<std::array<std::string, 3>> findTriple(const Names& names, const N
     return std::nullopt;
 }
 
+std::optional<std::array<std::string, 3>> findLuminance(const Names& names, const Names& layers) {
+    for (const auto& layer : layers)
+        if (const std::string name = layer + (layer.empty() ? "Y" : ".Y"); contains(names, name))
+            return std::array{name, name, name};
+    return std::nullopt;
+}
+
 std::vector<std::string> radianceChannels(const std::vector<std::string>& names, const std::string& name) {
     if (contains(names, name)) return {name};
     if (const auto triple = name.empty() ? std::nullopt : findTriple(names, {name}))
@@ -129,7 +137,9 @@ ChosenMap chooseStackMap(const std::string& path, const Names& names, const Stac
         case StackPreset::Cycles: {
             const auto layer = cyclesLayer(names);
             if (!layer)
-                throw Error(path, "expected a channel L.Combined.R of some layer L, found " + listed(names));
+                throw Error(
+                    path, "expected a channel L.Combined.R of some layer L, as --preset cycles says, found " +
+                              listed(names));
             chosen.map = cyclesMap(names, *layer);
             break;
         }
@@ -151,15 +161,15 @@ ChosenMap chooseStackMap(const std::string& path, const Names& names, const Stac
         const Names parts = radianceChannels(names, wanted);
         if (parts.empty())
             throw Error(path,
-                        "expected a channel or layer of radiance " + wanted + ", found " + listed(names));
+                        "expected a channel or layer " + wanted + " for --radiance, found " + listed(names));
         for (const auto& part : parts)
             if (!chosen.map.try_emplace(part, part).second)
-                throw Error(path, part + " is taken already and cannot be named as radiance");
+                throw Error(path, part + " is taken already and cannot be named by --radiance");
     }
     for (const char* needed : {"R", "G", "B"})
         if (!chosen.map.contains(needed))
-            throw Error(path, std::string("found nothing to take as ") + needed +
-                                  " (say it with a mapping); the image has " + listed(names));
+            throw Error(path, std::string("found nothing to take as ") + needed + " (name it: --map " +
+                                  needed + "=CHANNEL); the image has " + listed(names));
     return chosen;
 }
 

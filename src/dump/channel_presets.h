@@ -15,6 +15,10 @@ using Names = std::vector<std::string>;
 /// same with X Y Z. The layer "" is R, G, B themselves.
 std::optional<std::array<std::string, 3>> findTriple(const Names& names, const Names& layers);
 
+/// Luminance in place of three colours: three times the channel Y, or layer.Y, of the first of these layers
+/// that has it.
+std::optional<std::array<std::string, 3>> findLuminance(const Names& names, const Names& layers);
+
 /// The channel of the first of these layers that holds one number a pixel: the name itself or one of the
 /// endings that renderers give a depth.
 std::optional<std::string> findNumber(const Names& names, const Names& layers);

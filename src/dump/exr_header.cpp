@@ -18,7 +18,6 @@
 #include <array>
 #include <charconv>
 #include <cstring>
-#include <limits>
 #include <set>
 
 #include "header_walker.h"
@@ -106,10 +105,10 @@ Imf::Header parse(const std::string& path, const Bytes& bytes, const std::vector
 Window toWindow(const std::string& path, const char* what, const Imath::Box2i& box) {
     const std::int64_t width = std::int64_t{box.max.x} - box.min.x + 1;
     const std::int64_t height = std::int64_t{box.max.y} - box.min.y + 1;
-    constexpr std::int64_t most = std::numeric_limits<int>::max();
-    if (width < 1 || height < 1 || width > most || height > most)
-        throw Error(path, std::string("expected a ") + what + " of 1 to 2^31-1 columns and rows, found " +
-                              std::to_string(width) + " x " + std::to_string(height));
+    if (!isPossible(box.min.x, box.min.y, width, height))
+        throw Error(path, std::string("expected a ") + what + " of pixels within 2^30 of 0, found " +
+                              std::to_string(width) + " x " + std::to_string(height) + " pixels at (" +
+                              std::to_string(box.min.x) + ", " + std::to_string(box.min.y) + ")");
     return {box.min.x, box.min.y, static_cast<int>(width), static_cast<int>(height)};
 }
 
@@ -345,10 +344,11 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
         deepTiles = deepTiles || type == "deeptile";
     }
     if (part == parts.size())
-        throw Error(path, deepTiles
-                              ? "expected deep scanlines, found deep tiles, which Variolux does not read"
-                              : "expected deep samples, found only flat pixels (vlx-pack stack makes a "
-                                "dump of images of different seeds)");
+        throw Error(
+            path, deepTiles ? "expected deep scanlines, found deep tiles, which Variolux does not read"
+                            : "expected deep samples, found only flat pixels (of an image with variances "
+                              "vlx-pack moments makes a dump, and vlx-krige takes it as it is; of images of "
+                              "different seeds vlx-pack stack)");
     for (const char* required : {"channels", "compression", "dataWindow"})
         if (findAttribute(parts[part], required) == nullptr)
             throw Error(path, std::string("damaged header: attribute '") + required + "' is missing");
@@ -401,8 +401,9 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
     for (const char* name : {"R", "G", "B"})
         if (findChannel(header.dump, name) < 0) {
             std::string found;
-            for (const auto& channel : header.dump.channels) found += " " + channel.name;
-            throw Error(path, "expected channels R, G and B, found" + found);
+            for (const auto& channel : header.dump.channels)
+                found += (found.empty() ? " " : ", ") + channel.name;
+            throw Error(path, "expected deep samples with channels R, G and B, found" + found);
         }
     for (const auto& channel : header.dump.channels) header.bytesPerSample += valueBytes(channel.type);
     return header;

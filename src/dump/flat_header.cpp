@@ -38,15 +38,10 @@ class PartCheck {
         : path_(path), bytes_(bytes), attributes_(attributes) {}
 
     void operator()(std::uint64_t fileBytes) const {
-        const unsigned char* window = value("dataWindow", "box2i", 16);
-        std::array<std::int32_t, 4> corners{};
-        std::memcpy(corners.data(), window, sizeof corners);
-        const std::int64_t width = std::int64_t{corners[2]} - corners[0] + 1;
-        const std::int64_t height = std::int64_t{corners[3]} - corners[1] + 1;
-        if (width < 1 || height < 1 || width > 0x7fffffff || height > 0x7fffffff)
-            throw Error(path_, "expected a data window of 1 to 2^31-1 columns and rows, found " +
-                                   std::to_string(width) + " x " + std::to_string(height));
-        const auto columns = static_cast<std::uint64_t>(width), rows = static_cast<std::uint64_t>(height);
+        checkedWindow("displayWindow");
+        const Window window = checkedWindow("dataWindow");
+        const auto columns = static_cast<std::uint64_t>(window.width),
+                   rows = static_cast<std::uint64_t>(window.height);
         std::uint64_t chunks = 0, pixels = columns * rows;  // both factors are below 2^31
         const unsigned char compression = *value("compression", "compression", 1);
         if (findAttribute(attributes_, "tiles") != nullptr) {
@@ -66,12 +61,24 @@ class PartCheck {
         const std::uint64_t most =
             fileBytes * (compression < kFirstDwa ? kMostUnpacked : kMostUnpackedDwa) + kAllowance;
         if (chunks > fileBytes / 8 || pixels > most / std::max<std::uint64_t>(pixelBytes(), 1))
-            throw Error(path_, "truncated or damaged: the header claims " + std::to_string(width) + " x " +
-                                   std::to_string(height) + " pixels, more than the file's " +
+            throw Error(path_, "truncated or damaged: the header claims " + std::to_string(columns) + " x " +
+                                   std::to_string(rows) + " pixels, more than the file's " +
                                    std::to_string(fileBytes) + " bytes can hold");
     }
 
   private:
+    Window checkedWindow(const char* name) const {
+        std::array<std::int32_t, 4> corners{};
+        std::memcpy(corners.data(), value(name, "box2i", 16), sizeof corners);
+        const std::int64_t width = std::int64_t{corners[2]} - corners[0] + 1;
+        const std::int64_t height = std::int64_t{corners[3]} - corners[1] + 1;
+        if (!isPossible(corners[0], corners[1], width, height))
+            throw Error(path_, std::string("expected a ") + name + " of pixels within 2^30 of 0, found " +
+                                   std::to_string(width) + " x " + std::to_string(height) + " pixels at (" +
+                                   std::to_string(corners[0]) + ", " + std::to_string(corners[1]) + ")");
+        return {corners[0], corners[1], static_cast<int>(width), static_cast<int>(height)};
+    }
+
     const unsigned char* value(const char* name, const char* type, std::size_t bytes) const {
         const RawAttribute* found = findAttribute(attributes_, name);
         if (found == nullptr || found->type != type || found->end - found->value != bytes)

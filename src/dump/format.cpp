@@ -1,5 +1,9 @@
 #include "variolux/dump/format.h"
 
+#include <cmath>
+
+#include "variolux/base/image_io.h"
+
 namespace vlx {
 
 const std::vector<DumpChannel>& standardChannels() {
@@ -12,6 +16,16 @@ const std::vector<DumpChannel>& standardChannels() {
                                                       {"N.X", Half},       {"N.Y", Half},
                                                       {"N.Z", Half},       {"sample.replicate", Uint}};
     return channels;
+}
+
+std::optional<std::uint32_t> replicateNumber(float value) {
+    if (!(value >= 0 && value < 4294967296.f) || value != std::floor(value)) return std::nullopt;
+    return static_cast<std::uint32_t>(value);
+}
+
+void setInputs(DumpHeader& header, const std::string& inputs) {
+    header.extra.erase(kInputsAttribute);
+    if (!inputs.empty()) header.extra[kInputsAttribute] = inputs;
 }
 
 int findChannel(const DumpHeader& header, std::string_view name) {

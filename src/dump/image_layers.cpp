@@ -164,7 +164,8 @@ class Planner {
     }
 
   private:
-    // The image's channel that replaces `known`, if any.
+    // The image's channel that replaces `known`, if any. Of luminance, which all colours are taken from, the
+    // last in order, R: they are equal.
     void takeFor(const std::string& known, Channel& channel, PartPlan& plan, int number) {
         for (const auto& [from, to] : replace_) {
             if (to != known || image_.channel(from) < 0) continue;
@@ -172,8 +173,8 @@ class Planner {
             plan.touched = true;
             report_.replaced[known] = from;
             if (from == "R") main_ = number;
-            return;
         }
+        if (report_.replaced.contains(known)) return;
         if (replace_.contains(known) || image_.channel(known) < 0) return;
         channel.source = image_.channel(known);
         plan.touched = true;

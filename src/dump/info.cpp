@@ -8,6 +8,7 @@
 #include <set>
 
 #include "exr_header.h"
+#include "variolux/dump/layers.h"
 #include "variolux/dump/reader.h"
 
 namespace vlx {
@@ -111,11 +112,19 @@ DumpInfo inspectDump(const std::string& path, const Progress& progress) {
     const Window& window = info.header.data;
     std::vector<std::string> channels = {"R", "G", "B"};
     if (findChannel(info.header, "sample.replicate") >= 0) channels.emplace_back("sample.replicate");
-    std::set<float> replicates;
+    const bool positions =
+        findChannel(info.header, "sample.x") >= 0 && findChannel(info.header, "sample.y") >= 0;
+    if (positions) channels.insert(channels.end(), {"sample.x", "sample.y"});
+    PositionCheck check(info.header);
+    info.layers = layersFoundBy(reader);
+    std::set<std::uint32_t> replicates;
     for (int row = 0; row < window.height;) {
         const int rows = std::min(kBandRows, window.height - row);
         const SampleBand band = reader.read(window.y + row, rows, channels);
-        if (channels.size() > 3) replicates.insert(band.values[3].begin(), band.values[3].end());
+        if (const int c = band.channel("sample.replicate"); c >= 0)
+            for (const float value : band.values[static_cast<std::size_t>(c)])
+                replicates.insert(replicateNumber(value).value());
+        if (positions) check.add(band);
         for (std::size_t p = 0; p < band.pixels(); ++p) {
             const auto count = static_cast<std::uint32_t>(band.offsets[p + 1] - band.offsets[p]);
             info.minSamples = std::min(info.minSamples, count);
@@ -130,6 +139,7 @@ DumpInfo inspectDump(const std::string& path, const Progress& progress) {
         row += rows;
         if (progress) progress(row, window.height);
     }
+    info.positions = check.report();
     info.replicates = static_cast<std::uint32_t>(replicates.size());
     info.meanSamples = static_cast<double>(info.samples) / static_cast<double>(window.pixels());
     std::uint64_t bytesPerSample = 0;
@@ -157,6 +167,10 @@ std::string toText(const DumpInfo& info) {
                         " (least), " + numberText(info.meanSamples, "%.2f") + " (mean), " +
                         std::to_string(info.maxSamples) + " (most)");
     line("not finite", std::to_string(info.nonFiniteSamples) + " samples");
+    if (const std::string where = toText(info.positions); !where.empty()) line("WARNING", where);
+    if (!info.layers.empty())
+        line("WARNING",
+             "a layered deep image, by " + info.layers + ": layers are to be composited, not averaged");
     const double share =
         info.rawBytes > 0 ? 100.0 * static_cast<double>(info.fileBytes) / static_cast<double>(info.rawBytes)
                           : 100.0;
@@ -201,6 +215,7 @@ std::string toJson(const DumpInfo& info) {
                    {"emptyPixels", info.emptyPixels},
                    {"nonFinite", info.nonFiniteSamples},
                    {"replicates", info.replicates}}},
+                 {"layers", info.layers},
                  {"fileBytes", info.fileBytes},
                  {"rawBytes", info.rawBytes},
                  {"compression", compressionText(header.compression)},
@@ -209,6 +224,10 @@ std::string toJson(const DumpInfo& info) {
     json["channels"] = Json::array();
     for (const auto& channel : header.channels)
         json["channels"].push_back({{"name", channel.name}, {"type", typeText(channel.type)}});
+    if (info.positions.samples > 0)
+        json["positions"] = {{"notFinite", info.positions.notFinite},
+                             {"outside", info.positions.outside},
+                             {"warning", toText(info.positions)}};
     if (header.samples) json["samplesAskedFor"] = *header.samples;
     if (header.splatReplicates > 0) json["splatReplicates"] = header.splatReplicates;
     if (header.seed) json["seed"] = *header.seed;

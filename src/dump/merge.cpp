@@ -117,8 +117,7 @@ MergeReport mergeDumps(const std::vector<std::string>& paths, const std::string&
     header.splatReplicates = 0;  // the samples hold them
     header.data = options.crop ? boundsOf(parts) : header.display;
     header.renderSeconds.reset();  // close() records it
-    header.extra.erase(kInputsAttribute);
-    if (!options.inputs.empty()) header.extra[kInputsAttribute] = options.inputs;
+    setInputs(header, options.inputs);
     arrangeParts(parts, header.data, output);
 
     DumpWriter writer(output, header);

@@ -42,6 +42,7 @@ MomentRows::MomentRows(std::unique_ptr<FlatImages> images, MomentChannels channe
     header_.channels = dumpChannels(map, output_.halves);
     header_.compression = output_.compression;
     header_.renderer = output_.renderer;
+    setInputs(header_, output_.inputs);
     if (channels_.samples > 0) header_.samples = channels_.samples;
     const auto indexOf = [&](const std::string& name) {
         return static_cast<std::size_t>(findChannel(header_, name));

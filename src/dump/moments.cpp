@@ -66,6 +66,23 @@ MomentPreset recognise(const Names& names) {
     return MomentPreset::Plain;
 }
 
+const char* nameOf(MomentPreset preset) {
+    switch (preset) {
+        case MomentPreset::Pbrt:
+            return "pbrt's (--preset pbrt)";
+        case MomentPreset::Mitsuba:
+            return "Mitsuba's (--preset mitsuba)";
+        case MomentPreset::Tungsten:
+            return "Tungsten's (--preset tungsten)";
+        case MomentPreset::Arnold:
+            return "Arnold's (--preset arnold)";
+        case MomentPreset::RenderMan:
+            return "RenderMan's (--preset renderman)";
+        default:
+            return "no known renderer's (--preset plain)";
+    }
+}
+
 const char* nameOf(VarianceMeaning meaning) {
     switch (meaning) {
         case VarianceMeaning::OfSample:
@@ -102,11 +119,16 @@ ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& 
                                                      : *c == 'G' ? "Y"
                                                                  : "Z");
     } else {
-        const auto colour = findTriple(names, convention.colour);
+        auto colour = findTriple(names, convention.colour);
+        auto variance = findTriple(names, convention.variance);
+        if (preset == MomentPreset::Plain && !colour) {
+            colour = findLuminance(names, convention.colour);
+            if (colour && !variance) variance = findLuminance(names, convention.variance);
+        }
         if (preset == MomentPreset::Plain && !colour && cyclesLayer(names))
             map = chooseStackMap("", names, {.preset = StackPreset::Cycles}).map;
         enter(map, "", colour);
-        enter(map, "variance", findTriple(names, convention.variance));
+        enter(map, "variance", variance);
         enter(map, "albedo", findTriple(names, convention.albedo));
         enter(map, "N", findTriple(names, convention.normal));
         if (const auto depth = findNumber(names, convention.depth)) map["Z"] = *depth;
@@ -147,7 +169,8 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
         if (channel == "sample.replicate") throw Error(image, "sample.replicate cannot be mapped");
         origins[channel] = {0, name};
     }
-    for (const char* channel : {"R", "G", "B"}) require(images, origins, channel, "say it with a mapping");
+    for (const char* channel : {"R", "G", "B"})
+        require(images, origins, channel, std::string("name it: --map ") + channel + "=CHANNEL");
     for (const char* channel : {"variance.R", "variance.G", "variance.B"})
         if (!origins.contains(channel))
             throw Error(image,
@@ -161,8 +184,10 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
     MomentChannels source;
     const auto meaning = options.meaning ? options.meaning : convention.meaning;
     if (!meaning)
-        throw Error(image, "no renderer is known by these channels: say what its variance means, " +
-                               std::string("or name a preset; the image has ") + listed(names));
+        throw Error(image,
+                    "no renderer is known by these channels: say what its variance is (--variance-is sample, "
+                    "mean or second-moment), or whose they are (--preset); the image has " +
+                        listed(names));
     source.meaning = *meaning;
     source.xyz = options.xyz.value_or(convention.xyz);
     source.samples = options.samples > 0 ? options.samples : images.number(0, "samplesPerPixel").value_or(0);
@@ -170,8 +195,10 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
                          : source.meaning == VarianceMeaning::OfSample   ? 1
                                                                          : 0;
     if (source.samples < least)
-        throw Error(image, std::string("its variance is ") + nameOf(source.meaning) +
-                               ": expected the number of samples a pixel, found none in the file");
+        throw Error(image, std::string("its channels are taken for ") + nameOf(preset) +
+                               ", its variance for " + nameOf(source.meaning) +
+                               ": expected the number of samples a pixel, found none in the file. Say it "
+                               "(--samples N), or what else the variance is (--variance-is mean)");
     source.mean = takeThree(images, origins, {"R", "G", "B"});
     source.variance = takeThree(images, origins, {"variance.R", "variance.G", "variance.B"});
     if (source.meaning == VarianceMeaning::SecondMoment) {
@@ -188,17 +215,17 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
         if (!found && source.xyz)
             throw Error(image,
                         "second moments of X, Y, Z need their means: expected channels named like them "
-                        "without m2_; the image has " +
+                        "without m2_ (or --variance-of rgb where they are not of X, Y, Z); the image has " +
                             listed(names));
     }
     for (const auto& wanted : options.radiance) {
         const Names parts = radianceChannels(names, wanted);
         if (parts.empty())
             throw Error(image,
-                        "expected a channel or layer of radiance " + wanted + ", found " + listed(names));
+                        "expected a channel or layer " + wanted + " for --radiance, found " + listed(names));
         for (const auto& part : parts) {
             if (!origins.try_emplace(part, Origin{0, part}).second)
-                throw Error(image, part + " is taken already and cannot be named as radiance");
+                throw Error(image, part + " is taken already and cannot be named by --radiance");
             source.radiance.push_back({part, images.take(0, part), colourOf(part)});
         }
     }
@@ -210,6 +237,7 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
 
     ImportReport report;
     describe(images, origins, 1, report);
+    report.notes.push_back(std::string("The channels are taken for ") + nameOf(preset) + ".");
     report.notes.push_back(std::string("The variance is taken as ") + nameOf(source.meaning) +
                            (least > 0 ? ", of " + std::to_string(source.samples) + " samples." : "."));
     if (preset == MomentPreset::Pbrt)
@@ -222,7 +250,8 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
     const std::string renderer = options.renderer.empty() ? images.text(0, "Software") : options.renderer;
     return std::make_unique<MomentRows>(
         std::move(opened), std::move(source),
-        MomentOutput{renderer, options.halves, options.seed, options.compression}, std::move(report));
+        MomentOutput{renderer, options.halves, options.seed, options.compression, options.inputs},
+        std::move(report));
 }
 
 ImportReport importMoments(const std::string& image, const std::string& dump, const MomentOptions& options,

@@ -61,6 +61,7 @@ void sampleAtPoints(const std::string& path, const std::string& dump, const Poin
     header.renderer = "vlx-pack sample";
     header.scene = path;
     header.samples = static_cast<double>(options.points) / static_cast<double>(image.data.pixels());
+    setInputs(header, options.inputs);
     DumpWriter writer(dump, header);
 
     const std::vector<Place> places = sobolPlaces(image.data, options);

@@ -306,6 +306,7 @@ SampleBand DumpReader::read(int y, int rows, const std::vector<std::string>& cha
             widen(raw->data() + sources[c].bytesBefore * chunk.samples(), sources[c].type, chunk.samples(),
                   band.values[c].data() + starts[row]);
     });
+    checkReplicates(path(), band);
     if (splats) impl_->addSplats(band, dump.splatReplicates > 1 ? band.channel("sample.replicate") : -1);
     return band;
 }

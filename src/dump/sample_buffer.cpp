@@ -39,6 +39,7 @@ SampleBuffer::SampleBuffer(DumpHeader header, SampleBand samples, std::string na
                         [&](const auto& values) { return values.size() == samples_.samples(); }),
         "expected " + std::to_string(samples_.samples()) + " values of each channel, found another number");
     roundToStored(samples_, header_);
+    checkReplicates(name_, samples_);
 }
 
 SampleBand SampleBuffer::read(int y, int rows, const std::vector<std::string>& channels) const {

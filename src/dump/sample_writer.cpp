@@ -30,8 +30,7 @@ bool within(const Window& inner, const Window& outer) {
 struct StoredTile {
     Window window;
     std::uint32_t pass = 0;
-    std::uint64_t number = 0;               // order of arrival
-    std::uint64_t position = 0;             // of the counts
+    std::uint64_t position = 0;             // of the counts; grows in the order of arrival
     std::vector<std::uint64_t> rowSamples;  // samples before each row, and after the last
 };
 
@@ -84,7 +83,7 @@ struct SampleWriter::Impl {
             std::copy_n(tile.values_.begin() + static_cast<std::ptrdiff_t>(i * channels), channels,
                         sorted.begin() + static_cast<std::ptrdiff_t>(next[tile.pixels_[i]]++ * channels));
 
-        StoredTile stored{tile.window_, tile.pass_, 0, 0, {0}};
+        StoredTile stored{tile.window_, tile.pass_, 0, {0}};
         const auto width = static_cast<std::size_t>(tile.window_.width);
         for (std::size_t p = width; p <= pixels; p += width) stored.rowSamples.push_back(next[p - 1]);
         const std::uint64_t bytes = counts.size() * sizeof counts[0] + sorted.size() * sizeof sorted[0];
@@ -92,7 +91,6 @@ struct SampleWriter::Impl {
             const std::lock_guard lock(mutex);
             if (!writer) throw Error(spool.name(), "expected no more tiles after it was closed");
             stored.position = spoolEnd;
-            stored.number = tiles.size();
             spoolEnd += bytes;
         }
         spool.writeAt(stored.position, bytesOf(counts));
@@ -188,8 +186,8 @@ void SampleWriter::add(SampleTile tile) {
 void SampleWriter::close(double renderSeconds) {
     if (!impl_->writer) throw Error(impl_->spool.name(), "this dump is closed already");
     std::sort(impl_->tiles.begin(), impl_->tiles.end(), [](const StoredTile& a, const StoredTile& b) {
-        return std::tuple(a.pass, a.window.y, a.window.x, a.number) <
-               std::tuple(b.pass, b.window.y, b.window.x, b.number);
+        return std::tuple(a.pass, a.window.y, a.window.x, a.position) <
+               std::tuple(b.pass, b.window.y, b.window.x, b.position);
     });
     const Window& data = impl_->header.data;
     for (int row = 0; row < data.height; row += kBandRows)

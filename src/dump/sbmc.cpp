@@ -137,6 +137,7 @@ ImportReport importSbmc(const std::vector<std::string>& tiles, const std::string
     header.renderer = options.renderer;
     header.samples = corner.samples;
 
+    setInputs(header, options.inputs);
     DumpWriter writer(dump, header);
     for (const auto& [y, row] : rows) {
         std::vector<TileSamples> samples;

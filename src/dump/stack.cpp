@@ -59,6 +59,7 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
     for (const auto& name : sources.channels(0))
         if (!contains(taken, name)) report.ignored.push_back(name);
 
+    setInputs(header, options.inputs);
     DumpWriter writer(dump, header);
     const int bandRows = sources.bandRows(header.channels.size() * images.size());
     std::int64_t misses = 0;

@@ -2,6 +2,7 @@
 
 #include <Imath/half.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -45,6 +46,20 @@ SampleBand selectChannels(SampleBand band, const std::vector<std::string>& chann
     band.channels = channels;
     band.values = std::move(values);
     return band;
+}
+
+void checkReplicates(const std::string& path, const SampleBand& band) {
+    const int channel = band.channel("sample.replicate");
+    if (channel < 0) return;
+    const std::vector<float>& values = band.values[static_cast<std::size_t>(channel)];
+    const auto broken = std::ranges::find_if(values, [](float v) { return !replicateNumber(v); });
+    if (broken == values.end()) return;
+    const auto sample = static_cast<std::uint64_t>(broken - values.begin());
+    const auto pixel = std::ranges::upper_bound(band.offsets, sample) - band.offsets.begin() - 1;
+    throw Error(path, "expected whole numbers from 0 to 2^32-1 in channel sample.replicate, found " +
+                          std::to_string(*broken) + " in pixel (" +
+                          std::to_string(band.x + pixel % band.width) + ", " +
+                          std::to_string(band.y + pixel / band.width) + ")");
 }
 
 void checkRows(const std::string& path, const DumpHeader& header, int y, int rows) {

@@ -9,7 +9,6 @@
 
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
-#include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
 
@@ -27,16 +26,16 @@ void forEachBandOf(const Window& window, const Body& body) {
 }
 
 /// The new numbers of the replicates to keep.
-using ReplicateChoice = std::map<float, float>;
+using ReplicateChoice = std::map<std::uint32_t, float>;
 
 /// Which replicates to keep, or nothing when the dump has fewer than two.
 std::optional<ReplicateChoice> chooseReplicates(const DumpReader& reader, const SubsetOptions& options) {
     if (findChannel(reader.header(), kReplicate) < 0) return std::nullopt;
-    std::set<float> all;
+    std::set<std::uint32_t> all;
     std::uint64_t samples = 0;
     forEachBandOf(reader.header().data, [&](int y, int rows) {
         const SampleBand band = reader.read(y, rows, {kReplicate});
-        all.insert(band.values[0].begin(), band.values[0].end());
+        for (const float value : band.values[0]) all.insert(replicateNumber(value).value());
         samples += band.samples();
     });
     if (all.size() < 2) return std::nullopt;
@@ -56,8 +55,8 @@ std::optional<ReplicateChoice> chooseReplicates(const DumpReader& reader, const 
         throw Error(reader.path(), "expected at least " + std::to_string(first + kept) +
                                        " replicates for part " + std::to_string(options.part) + ", found " +
                                        std::to_string(all.size()));
-    std::vector<std::pair<std::uint64_t, float>> order;
-    for (const float replicate : all)
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+    for (const std::uint32_t replicate : all)
         order.emplace_back(hashOf(options.seed, static_cast<std::int64_t>(replicate)), replicate);
     std::sort(order.begin(), order.end());
     ReplicateChoice choice;
@@ -116,8 +115,8 @@ SubsetReport subsetDump(const std::string& input, const std::string& output, con
     const auto replicates = chooseReplicates(reader, options);
 
     DumpHeader header = reader.header();
-    header.extra.erase(kInputsAttribute);  // of the whole dump
-    header.splatReplicates = 0;            // the samples hold them
+    setInputs(header, options.inputs);  // not those of the whole dump
+    header.splatReplicates = 0;         // the samples hold them
     const Window window = header.data;
     header.compression = options.compression;
     const std::optional<double> renderSeconds = header.renderSeconds;
@@ -135,8 +134,9 @@ SubsetReport subsetDump(const std::string& input, const std::string& output, con
         for (std::size_t p = 0; p < band.pixels(); ++p) {
             if (replicates) {
                 for (std::uint64_t i = band.offsets[p]; i < band.offsets[p + 1]; ++i) {
-                    const auto found = replicates->find(
-                        band.values[static_cast<std::size_t>(channel)][static_cast<std::size_t>(i)]);
+                    const float value =
+                        band.values[static_cast<std::size_t>(channel)][static_cast<std::size_t>(i)];
+                    const auto found = replicates->find(replicateNumber(value).value());
                     if (found == replicates->end()) continue;
                     append(out, band, i);
                     out.values[static_cast<std::size_t>(channel)].back() = found->second;

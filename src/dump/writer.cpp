@@ -105,12 +105,8 @@ DumpHeader sortedByName(DumpHeader header) {
 
 void validate(const std::string& path, const DumpHeader& header) {
     for (const Window& window : {header.data, header.display}) {
-        const bool fits = window.width > 0 && window.height > 0 &&
-                          std::int64_t{window.x} + window.width - 1 <= kMaxInt &&
-                          std::int64_t{window.y} + window.height - 1 <= kMaxInt;
-        if (!fits)
-            throw Error(path, "expected a window with pixels, within 31-bit coordinates, found " +
-                                  windowText(window));
+        if (!isPossible(window.x, window.y, window.width, window.height))
+            throw Error(path, "expected a window of pixels within 2^30 of 0, found " + windowText(window));
     }
     std::set<std::string> names;
     for (const auto& channel : header.channels) {

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "rebin.h"
+#include "variolux/base/memory.h"
 
 namespace vlx {
 
@@ -45,9 +46,12 @@ ChannelChoice chooseChannels(const DumpHeader& header) {
     return choice;
 }
 
-Image makeOutputImage(const DumpHeader& header, const ChannelChoice& channels) {
+Image makeOutputImage(const SampleSource& dump, const ChannelChoice& channels) {
     std::vector<std::string> names(channels.names.begin(), channels.names.begin() + channels.radianceCount());
     for (const char* channel : {"stddev.R", "stddev.G", "stddev.B"}) names.emplace_back(channel);
+    const DumpHeader& header = dump.header();
+    requireMemory(dump.path(), imageBytes(header.data, names.size()),
+                  "an image held whole (--method krige with --filter box holds rows)");
     Image image(header.data, std::move(names));
     image.display = header.display;
     return image;

@@ -21,8 +21,9 @@ struct ChannelChoice {
 /// R, G, B, then A and the sample positions where the dump has them.
 ChannelChoice chooseChannels(const DumpHeader& header);
 
-/// An image of the dump's windows with R, G, B (A) and stddev.R, stddev.G, stddev.B.
-Image makeOutputImage(const DumpHeader& header, const ChannelChoice& channels);
+/// An image of the dump's windows with R, G, B (A) and stddev.R, stddev.G, stddev.B. Throws Error when there
+/// is not the memory for it.
+Image makeOutputImage(const SampleSource& dump, const ChannelChoice& channels);
 
 /// The least multiple of `step` greater than `a`, which may be negative: windows may start anywhere.
 int nextMultiple(int a, int step);

@@ -13,6 +13,7 @@
 #include "rebin.h"
 #include "stacking.h"
 #include "variolux/base/error.h"
+#include "variolux/base/memory.h"
 #include "variolux/base/parallel.h"
 #include "variolux/geostat/random_drift.h"
 
@@ -52,6 +53,17 @@ Window scaled(const Window& window, int scale) {
     return {window.x * scale, window.y * scale, window.width * scale, window.height * scale};
 }
 
+/// Throws Error when the options are invalid, by themselves or for this dump.
+void check(const SampleSource& dump, const DriftKrigingOptions& options) {
+    if (const auto broken = options.validate()) throw Error("", *broken);
+    for (const Window& w : {dump.header().data, dump.header().display}) {
+        const std::int64_t scale = options.scale;
+        if (!isPossible(w.x * scale, w.y * scale, w.width * scale, w.height * scale))
+            throw Error(dump.path(), "expected pixels within 2^30 of 0 after --scale " +
+                                         std::to_string(scale) + ", found others: a smaller --scale helps");
+    }
+}
+
 class Stopwatch {
   public:
     /// Adds the time since the last call (or construction) to `seconds`.
@@ -82,12 +94,12 @@ class Pipeline {
           height_(dump.header().data.height * options.scale),
           readRows_(kReadRows / options.scale),
           radiance_(layout_.radiance),
-          gathered_(width_, planes_.channels, kGatheredRows),
-          data_(width_, DataPlanes{radiance_}.channels(), kDataRows),
-          squares_(width_, kSquaresPlanes, kDataRows),
-          features_(width_, 2 * layout_.features, kFeatureRows),
-          variances_(width_, 3, kFeatureRows),
-          moments_(width_, Combination::momentPlanes(static_cast<int>(models_.size())), kEstimateRows),
+          gathered_(width_, planes_.channels, kept(kGatheredRows)),
+          data_(width_, DataPlanes{radiance_}.channels(), kept(kDataRows)),
+          squares_(width_, kSquaresPlanes, kept(kDataRows)),
+          features_(width_, 2 * layout_.features, kept(kFeatureRows)),
+          variances_(width_, 3, kept(kFeatureRows)),
+          moments_(width_, Combination::momentPlanes(static_cast<int>(models_.size())), kept(kEstimateRows)),
           picture_(measurePictureScale(dump, layout_)),
           pixels_(dump, layout_, planes_, options.scale, width_, height_,
                   options.fireflies == Fireflies::Robust, gathered_, data_, squares_),
@@ -100,15 +112,16 @@ class Pipeline {
                                          " and " + std::to_string(radiance_));
         const EstimatePlanes planes{radiance_};
         for (std::size_t m = 0; m < models_.size(); ++m) {
-            sums_.emplace_back(width_, planes.channels(), kSumRows);
-            estimates_.emplace_back(width_, 2 * radiance_ + 3, kEstimateRows);
+            sums_.emplace_back(width_, planes.channels(), kept(kSumRows));
+            estimates_.emplace_back(width_, 2 * radiance_ + 3, kept(kEstimateRows));
         }
+        requireMemory(dump.path(), ringBytes(), "rows as wide as these");
+        if (options.maxMemory > 0) limitRowsRead();
         const Window window = driftKrigingOutline(dump, options).data;
         firstRow_ = window.y - scaled(dump.header().data, options.scale).y;
         endRow_ = firstRow_ + window.height;
-        rows_ =
-            Image({0, 0, width_, kTile}, std::vector<std::string>(static_cast<std::size_t>(radiance_ + 3)));
-        if (options.maxMemory > 0) limitRowsRead();
+        rows_ = Image({0, 0, width_, kept(kTile)},
+                      std::vector<std::string>(static_cast<std::size_t>(radiance_ + 3)));
         startAbove(firstRow_);
     }
 
@@ -138,22 +151,36 @@ class Pipeline {
             std::max(0, dataRows_ - PixelData::reach(options_.scale)) / options_.scale * options_.scale;
     }
 
+    /// How many of `rows` rows a ring of the whole image has use for.
+    int kept(int rows) const { return std::min(rows, height_); }
+
+    /// Of all rows that are kept; none is taken yet when the pipeline is made.
+    std::uint64_t ringBytes() const {
+        std::uint64_t bytes = static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(kept(kTile)) *
+                              static_cast<std::uint64_t>(radiance_ + 3) * sizeof(float);
+        for (const RowRing* ring : {&gathered_, &data_, &squares_, &features_, &variances_, &moments_})
+            bytes += ring->bytes();
+        for (const auto* list : {&sums_, &estimates_})
+            for (const RowRing& ring : *list) bytes += ring.bytes();
+        return bytes;
+    }
+
     /// Chooses how many rows are read at a time by options_.maxMemory and the fullest row of the dump.
     void limitRowsRead() {
         const Window& data = dump_.header().data;
         std::uint64_t samples = 0;
+        bool gaps = false;
         for (int y = data.y; y < data.y + data.height; ++y) {
             std::uint64_t ofRow = 0;
-            for (const std::uint32_t n : dump_.counts(y, 1)) ofRow += n;
+            for (const std::uint32_t n : dump_.counts(y, 1)) {
+                ofRow += n;
+                gaps = gaps || n == 0;
+            }
             samples = std::max(samples, ofRow);
         }
-        std::uint64_t rings = rows_.pixels.size() * sizeof(float);
-        for (const RowRing* ring : {&gathered_, &data_, &squares_, &features_, &variances_, &moments_})
-            rings += ring->bytes();
-        for (const auto* list : {&sums_, &estimates_})
-            for (const RowRing& ring : *list) rings += ring.bytes();
-        const std::uint64_t held =
-            kProcessBytes + rings + kThreadBytes * static_cast<std::uint64_t>(threadCount());
+        const std::uint64_t held = kProcessBytes + ringBytes() +
+                                   kThreadBytes * static_cast<std::uint64_t>(threadCount()) +
+                                   (gaps ? GapField::bytes(dump_, layout_) : 0);
         // The values of a row, twice where they are sorted into parts of pixels; and, on each thread that
         // unpacks one, all its channels packed and unpacked.
         const auto width = static_cast<std::uint64_t>(data.width);
@@ -418,6 +445,7 @@ std::optional<std::string> DriftKrigingOptions::validate() const {
 }
 
 Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& options) {
+    check(dump, options);
     Image image;
     image.data = bandOf(scaled(dump.header().data, options.scale), options.band);
     if (image.data.height == 0)
@@ -435,14 +463,14 @@ Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& o
 
 ReconstructionReport reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
                                              const RowSink& sink, const Progress& progress) {
-    if (const auto broken = options.validate()) throw Error("", *broken);
+    check(dump, options);
     return Pipeline(dump, options, sink, progress).run();
 }
 
 Reconstruction reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
                                        const Progress& progress) {
-    if (const auto broken = options.validate()) throw Error("", *broken);
     const Image outline = driftKrigingOutline(dump, options);
+    requireMemory(dump.path(), imageBytes(outline.data, outline.channels.size()), "an image held whole");
     Reconstruction result;
     result.image = Image(outline.data, outline.channels);
     result.image.display = outline.display;

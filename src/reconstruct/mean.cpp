@@ -40,7 +40,7 @@ Reconstruction reconstructMean(const SampleSource& dump, const Progress& progres
 
     const PictureScale picture = measurePictureScale(dump);
     Reconstruction result;
-    result.image = makeOutputImage(dump.header(), channels);
+    result.image = makeOutputImage(dump, channels);
     std::atomic<std::int64_t> dropped = 0, empty = 0;
     forEachBand(dump, channels, kNeighbourhood, result.report, progress, [&](const SampleBand& band) {
         parallelFor(0, band.height, [&](std::int64_t line) {

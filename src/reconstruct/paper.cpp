@@ -24,9 +24,11 @@ constexpr double kMinExponent = 0.25;  // lower ones are a nugget in all but nam
 
 /// The index of the pixel of the region that holds a position.
 int pixelOf(const Window& pixels, double x, double y) {
-    const int col = std::clamp(static_cast<int>(std::floor(x)) - pixels.x, 0, pixels.width - 1);
-    const int row = std::clamp(static_cast<int>(std::floor(y)) - pixels.y, 0, pixels.height - 1);
-    return row * pixels.width + col;
+    // Clamped before it is an int: positions of other conventions may be anywhere.
+    const auto within = [](double position, int first, int count) {
+        return static_cast<int>(std::clamp(std::floor(position) - first, 0.0, count - 1.0));
+    };
+    return within(y, pixels.y, pixels.height) * pixels.width + within(x, pixels.x, pixels.width);
 }
 
 /// A pixel's samples are as many as an adaptive sampler saw fit: they must not outweigh its neighbours'.
@@ -335,7 +337,7 @@ Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& op
     const PictureScale picture = measurePictureScale(dump);
 
     Reconstruction result;
-    result.image = makeOutputImage(header, channels);
+    result.image = makeOutputImage(dump, channels);
     const auto reconstructBand = [&](const SampleBand& band) {
         const std::vector<Window> regions =
             whole ? std::vector<Window>{header.data}

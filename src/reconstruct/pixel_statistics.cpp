@@ -29,9 +29,14 @@ void addFeatures(const DumpHeader& header, const std::vector<std::string>& chann
 
 void requireChannel(const SampleSource& dump, const SampleLayout& layout, const std::string& channel) {
     if (findChannel(dump.header(), channel) < 0)
-        throw Error(dump.path(), "expected a channel '" + channel + "', found none of that name");
+        throw Error(dump.path(),
+                    "expected a channel '" + channel +
+                        "' (of --feature, --radiance, or of --scale, which needs positions), found "
+                        "none of that name");
     if (std::find(layout.names.begin(), layout.names.end(), channel) != layout.names.end())
-        throw Error(dump.path(), "channel '" + channel + "' is used already and cannot be named again");
+        throw Error(
+            dump.path(),
+            "channel '" + channel + "' is used already and cannot be named again by --feature or --radiance");
 }
 
 /// Whether the radiance of a sample is finite, its channels those from `first` on; alpha is none.
@@ -217,8 +222,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         halves[1].clear();
         if (layout.replicate >= 0)
             for (const std::size_t s : taken)
-                halves[static_cast<std::uint32_t>(
-                           band.values[static_cast<std::size_t>(layout.replicate)][s]) %
+                halves[replicateNumber(band.values[static_cast<std::size_t>(layout.replicate)][s]).value() %
                        2]
                     .push_back(s);
         if (halves[0].empty() || halves[1].empty()) {  // no replicates, or only one

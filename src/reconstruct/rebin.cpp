@@ -50,8 +50,8 @@ SampleBand averageReplicates(const SampleBand& band, std::size_t replicateChanne
         std::stable_sort(order.begin(), order.end(),
                          [&](std::size_t a, std::size_t b) { return replicate[a] < replicate[b]; });
         for (std::size_t first = 0, end = 0; first < order.size(); first = end) {
-            while (end < order.size() && replicate[order[end]] == replicate[order[first]]) ++end;
-            end = std::max(end, first + 1);  // a NaN is a replicate of its own
+            do ++end;
+            while (end < order.size() && replicate[order[end]] == replicate[order[first]]);
             for (std::size_t c = 0; c < band.values.size(); ++c) {
                 double sum = 0;
                 for (std::size_t i = first; i < end; ++i)

@@ -2,12 +2,14 @@
 
 #include <cassert>
 #include <cstddef>
-#include <vector>
+#include <cstdlib>
+#include <memory>
+#include <new>
 
 namespace vlx {
 
 /// Rows of several planes of floats, of which only the last `capacity` are kept: row y overwrites row
-/// y - capacity. Rows are counted from 0; contiguous along x.
+/// y - capacity. Rows are counted from 0; contiguous along x; zeros until written.
 class RowRing {
   public:
     RowRing() = default;
@@ -15,13 +17,19 @@ class RowRing {
         : width_(static_cast<std::size_t>(width)),
           channels_(channels),
           capacity_(capacity),
-          values_(width_ * static_cast<std::size_t>(channels) * static_cast<std::size_t>(capacity)) {}
+          // calloc: large blocks are only asked for here, and taken row by row as they are written.
+          values_(static_cast<float*>(std::calloc(bytes() / sizeof(float), sizeof(float)))) {
+        if (!values_ && bytes() > 0) throw std::bad_alloc();
+    }
 
     int channels() const { return channels_; }
-    std::size_t bytes() const { return values_.size() * sizeof(float); }
+    std::size_t bytes() const {
+        return width_ * static_cast<std::size_t>(channels_) * static_cast<std::size_t>(capacity_) *
+               sizeof(float);
+    }
 
-    float* row(int channel, int y) { return values_.data() + offset(channel, y); }
-    const float* row(int channel, int y) const { return values_.data() + offset(channel, y); }
+    float* row(int channel, int y) { return values_.get() + offset(channel, y); }
+    const float* row(int channel, int y) const { return values_.get() + offset(channel, y); }
 
   private:
     std::size_t offset(int channel, int y) const {
@@ -34,7 +42,10 @@ class RowRing {
     std::size_t width_ = 0;
     int channels_ = 0;
     int capacity_ = 1;
-    std::vector<float> values_;
+    struct Free {
+        void operator()(float* values) const { std::free(values); }
+    };
+    std::unique_ptr<float[], Free> values_;
 };
 
 }  // namespace vlx

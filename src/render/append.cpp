@@ -39,13 +39,13 @@ std::uint64_t EarlierDump::samples() const {
 std::uint32_t EarlierDump::freeReplicate() const {
     if (!hasReplicates()) return 0;
     constexpr int kRows = 16;
-    float most = -1;
+    std::uint32_t next = 0;
     const Window& w = header().data;
     for (int y = w.y; y < w.y + w.height; y += kRows) {
         const SampleBand band = reader_.read(y, std::min(kRows, w.y + w.height - y), {"sample.replicate"});
-        for (const float v : band.values[0]) most = std::max(most, v);
+        for (const float v : band.values[0]) next = std::max(next, replicateNumber(v).value() + 1);
     }
-    return static_cast<std::uint32_t>(most + 1);
+    return next;
 }
 
 void EarlierDump::checkSameView(const DumpHeader& traced) const {

@@ -84,6 +84,32 @@ TEST(ImageIo, BadFilesAreErrorsThatNameTheFile) {
     EXPECT_EQ(folder.entries(), 1);
 }
 
+// Memory is limited by what is in a file, not by what its header says.
+TEST(ImageIo, HugeClaimsOfSmallFilesAreRefused) {
+    const TemporaryFolder folder;
+    ImageWriteOptions options;
+    options.compression = "none";
+    writeImage(folder / "a.exr", Image({0, 0, 4, 4}, {"R", "G", "B"}), options);
+    std::ifstream file(folder / "a.exr", std::ios::binary);
+    std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    for (const std::string name : {"dataWindow", "displayWindow"}) {
+        const std::size_t at = bytes.find(name + '\0' + "box2i");
+        ASSERT_NE(at, std::string::npos);
+        const std::int32_t last = 19'999;
+        for (const std::size_t corner : {8, 12})
+            bytes.replace(at + name.size() + 11 + corner, 4, reinterpret_cast<const char*>(&last), 4);
+    }
+    // Room for the table of rows, so that the file can be opened.
+    bytes.resize(bytes.size() + 8 * 20'000);
+    std::ofstream(folder / "a.exr", std::ios::binary) << bytes;
+    try {
+        readImage(folder / "a.exr");
+        FAIL();
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("bytes can hold"), std::string::npos) << error.what();
+    }
+}
+
 TEST(LinearToSrgb, MeetsTheStandardsValues) {
     EXPECT_EQ(linearToSrgb(-1.0f), 0.0f);
     EXPECT_EQ(linearToSrgb(2.0f), 1.0f);

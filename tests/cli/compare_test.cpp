@@ -139,6 +139,18 @@ TEST_F(CompareTool, WritesPicturesWithCropsOnlyWhenAskedFor) {
     EXPECT_TRUE(fs::exists(out + "/crops.png"));
 }
 
+TEST_F(CompareTool, PicturesAreNotWrittenOverInputs) {
+    const std::string input = folder_ / "signed_error.png";
+    Image image({0, 0, 8, 8}, {"R", "G", "B"});
+    writeImage(input, image);
+    const auto bytes = fs::file_size(input);
+    const ToolRun refused = run({input, input, "--pictures", folder_ / "."});
+    EXPECT_EQ(refused.exitCode, 2);
+    EXPECT_NE(refused.err.find("--pictures: expected another file than the input"), std::string::npos)
+        << refused.err;
+    EXPECT_EQ(fs::file_size(input), bytes);
+}
+
 TEST_F(CompareTool, LayersAndStandardDeviations) {
     Image image(reference_.data,
                 {"light.R", "light.G", "light.B", "stddev.R", "stddev.G", "stddev.B", "R", "G", "B"});

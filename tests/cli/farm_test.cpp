@@ -146,6 +146,40 @@ TEST_F(Finished, TracesAreSkippedUntilSomethingChanges) {
     EXPECT_NE(run.out.find("\"skipped\": true"), std::string::npos) << run.out;
 }
 
+// What counts is what the program does: a copy does the same, one that was built anew may not.
+TEST_F(Finished, AnotherProgramDoesTheWorkAnew) {
+    const std::string out = folder / "out.exr", copy = folder / "vlx-krige";
+    const Arguments command = {kDump, "-o", out, "--method", "mean"};
+    fs::copy_file(VLX_BIN "/vlx-krige", copy);
+    EXPECT_TRUE(works("vlx-krige", command, out));
+    EXPECT_FALSE(works(copy, command, out));
+    std::ofstream(copy, std::ios::app) << "other code";
+    EXPECT_TRUE(works(copy, command, out));
+}
+
+TEST_F(Finished, CommandsOfVlxPackToo) {
+    const std::string out = folder / "out.exr", image = folder / "image.exr";
+    Image flat({0, 0, 6, 5}, {"R", "G", "B", "variance.R", "variance.G", "variance.B"});
+    writeImage(image, flat);
+    for (const Arguments& command : {Arguments{"stack", image, image, "-o", out},
+                                     {"buffers", image, image, "-o", out},
+                                     {"moments", image, "-o", out, "--variance-is", "mean"},
+                                     {"sample", image, "-o", out},
+                                     {"subset", kDump, "-o", out, "--samples", "2"},
+                                     {"merge", kDump, "-o", out, "--crop"}}) {
+        EXPECT_TRUE(works("vlx-pack", command, out)) << command.front();
+        EXPECT_FALSE(works("vlx-pack", command, out)) << command.front();
+        EXPECT_TRUE(works("vlx-pack", command + Arguments{"--overwrite"}, out)) << command.front();
+    }
+    flat.pixels.front() = 1;
+    writeImage(image, flat);
+    const Arguments stack = {"stack", image, image, "-o", out};
+    EXPECT_TRUE(works("vlx-pack", stack, out));
+    flat.pixels.front() = 2;
+    writeImage(image, flat);
+    EXPECT_TRUE(works("vlx-pack", stack, out)) << "another input";
+}
+
 TEST_F(Finished, ImagesNeedAllTheirOutputs) {
     const std::string out = folder / "out.exr", map = folder / "map.exr";
     const Arguments command = {kDump, "-o", out, "--method", "mean", "--sampling-map", map};
@@ -265,6 +299,23 @@ TEST(MaxMemory, IsKeptAndTheImageIsTheSame) {
     EXPECT_LE(tight.peakBytes, least * 1'000'000);
     EXPECT_LT(tight.peakBytes, free.peakBytes);
     EXPECT_EQ(readImage(folder / "tight.exr").pixels, readImage(folder / "free.exr").pixels);
+}
+
+// What a small file claims takes no more than what is in it: of one row, no rows above and below are kept.
+TEST(Memory, OfASingleWideRowIsThatOfTheRow) {
+    const TemporaryFolder folder;
+    const std::string dump = folder / "wide.exr", errors = folder / "errors";
+    writeWide(dump, 60'000, 1, 0);
+    const Measured run = finish(start({dump, "-o", folder / "out.exr", "-q"}, errors));
+    ASSERT_EQ(run.exitCode, 0) << contents(errors);
+    EXPECT_LT(run.peakBytes, 400'000'000u);
+
+    // A limit is kept also where it is too small: what cannot be is told before memory is taken.
+    writeWide(dump, 20'000, 200, 0);
+    const Measured refused = finish(start({dump, "-o", folder / "none.exr", "--max-memory", "400M"}, errors));
+    EXPECT_EQ(refused.exitCode, 1);
+    EXPECT_NE(contents(errors).find("expected a memory limit of at least"), std::string::npos);
+    EXPECT_LT(refused.peakBytes, 400'000'000u);
 }
 
 TEST(Load, ThirtyTwoProcessesAtOnceFinishWithinTheirLimits) {

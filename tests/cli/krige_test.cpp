@@ -131,8 +131,8 @@ TEST(VlxKrige, BadUsageIsExitTwo) {
           {kDump, "-o", out, "--method", "magic"},
           {kDump, "-o", out, "--sigma", "0"},
           {kDump, "-o", out, "--sigma"},
-          {kDump, "-o", out, "--region", "0"},
-          {kDump, "-o", out, "--region", "8", "--whole-image"},
+          {kDump, "-o", out, "--method", "paper", "--region", "0"},
+          {kDump, "-o", out, "--method", "paper", "--region", "8", "--whole-image"},
           {kDump, "-o", out, "--method", "mean", "--diagnostics"},
           {kDump, "-o", out, "--diagnostics"},
           {kDump, "-o", out, "--quality", "best"},
@@ -141,8 +141,8 @@ TEST(VlxKrige, BadUsageIsExitTwo) {
           {kDump, "-o", out, "--fireflies", "clamp", "--clamp", "0"},
           {kDump, "-o", out, "--strength", "1.1"},
           {kDump, "-o", out, "--inspect", "1,1"},
-          {kDump, "-o", out, "--diagnostics", "--inspect", "1"},
-          {kDump, "-o", out, "--diagnostics", "--inspect", "1,x"},
+          {kDump, "-o", out, "--method", "paper", "--diagnostics", "--inspect", "1"},
+          {kDump, "-o", out, "--method", "paper", "--diagnostics", "--inspect", "1,x"},
           {kDump, "-o", out, "--threads", "-1"},
           {kDump, "-o", folder / "out.png"},
           {kDump, "-o", kDump},
@@ -324,7 +324,7 @@ TEST(VlxKrigeFlat, WhatDoesNotFitIsTold) {
           "other.exr: expected the image's data window");
     fails({folder / "in.exr", "--template", kDump}, 1, "expected a flat image");
     fails({folder / "in.exr", "--band", "1/2"}, 2, "--band, --scale and --max-memory go with --drop-layers");
-    fails({folder / "in.exr", "--radiance", "rim"}, 1, "layer of radiance rim");
+    fails({folder / "in.exr", "--radiance", "rim"}, 1, "layer rim for --radiance");
     fails({kDump, "--variance", folder / "in.exr"}, 2, "--variance goes with a flat image");
     fails({kDump, "--drop-layers"}, 2, "--drop-layers goes with a flat image");
 }

@@ -63,17 +63,22 @@ TEST(VlxPackImport, EachCommandSaysWhatItTookAndWhatIsMissing) {
 TEST(VlxPackImport, BadUsageAndFailures) {
     const Sources s;
     const std::string raw = s.folder / "s.raw", image = s.folder / "mse.exr";
-    for (const std::vector<std::string>& arguments : {std::vector<std::string>{"bcd", raw, raw, "-o", s.out},
-                                                      {"bcd", image, "-o", s.out},
-                                                      {"bcd", raw},
-                                                      {"moments", image, "-o", s.out, "--variance-is", "big"},
-                                                      {"moments", image, "-o", s.out, "--samples", "0"},
-                                                      {"moments", image, "-o", image},
-                                                      {"moments", image, "-o", s.out, "--map", "R"},
-                                                      {"buffers", image, "-o", s.out},
-                                                      {"sbmc", "-o", s.out},
-                                                      {"merge", image},
-                                                      {"merge", image, "-o", s.out, "--log", "loud"}}) {
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"bcd", raw, raw, "-o", s.out},
+          {"bcd", image, "-o", s.out},
+          {"bcd", raw},
+          {"moments", image, "-o", s.out, "--variance-is", "big"},
+          {"moments", image, "-o", s.out, "--samples", "0"},
+          {"moments", image, "-o", image},
+          {"moments", image, "-o", s.out, "--map", "R"},
+          {"buffers", image, "-o", s.out},
+          {"bcd", raw, "-o", s.out, "--samples", "4"},
+          {"bcd", raw, "-o", s.out, "--single"},
+          {"bcd", raw, "-o", s.out, "--seed", "4"},
+          {"moments", image, "-o", s.out, "--single", "--seed", "4"},
+          {"sbmc", "-o", s.out},
+          {"merge", image},
+          {"merge", image, "-o", s.out, "--log", "loud"}}) {
         const ToolRun run = pack(arguments);
         EXPECT_EQ(run.exitCode, 2) << run.err;
         EXPECT_TRUE(run.err.starts_with("vlx-pack: ")) << run.err;

@@ -64,7 +64,8 @@ TEST(VlxPack, BadUsageIsExitTwoWithAMessage) {
                                                       {"stack", images[0], "-o", out, "--map"},
                                                       {"stack", images[0], "-o", out, "--map", "R"},
                                                       {"stack", images[0], "-o", out, "--map", "=G"},
-                                                      {"stack", images[0], "-o", out, "--map", "R="}}) {
+                                                      {"stack", images[0], "-o", out, "--map", "R="},
+                                                      {"stack", images[0], "-o", images[0]}}) {
         const ToolRun run = pack(arguments);
         std::string line = "vlx-pack";
         for (const auto& argument : arguments) line += " " + argument;

@@ -25,7 +25,7 @@ std::string contents(std::FILE* file) {
 
 ToolRun runTool(const std::string& tool, const std::vector<std::string>& arguments,
                 const RunOptions& options) {
-    const std::string program = std::string(VLX_BIN) + "/" + tool;
+    const std::string program = tool.starts_with('/') ? tool : std::string(VLX_BIN) + "/" + tool;
     std::vector<char*> argv = {const_cast<char*>(program.c_str())};
     for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
     argv.push_back(nullptr);

@@ -20,8 +20,8 @@ struct RunOptions {
     std::optional<std::uint64_t> cpuSeconds = {};     ///< after which it counts as hanging
 };
 
-/// Runs a program of this build, for example runTool("vlx-compare", {"--version"}), without a shell and
-/// without standard input, and waits for its end.
+/// Runs a program of this build, for example runTool("vlx-compare", {"--version"}), or of this path, without
+/// a shell and without standard input, and waits for its end.
 ToolRun runTool(const std::string& tool, const std::vector<std::string>& arguments,
                 const RunOptions& options = {});
 

@@ -127,6 +127,14 @@ TEST(VlxCompareSweep, OfADumpThenAgainThenInterrupted) {
     const ToolRun changed = sweep(arguments);
     ASSERT_EQ(changed.exitCode, 0) << changed.err;
     EXPECT_NE(changed.out.find("0 of 19 results were there already"), std::string::npos) << changed.out;
+
+    std::vector<std::string> anew = arguments;
+    anew.emplace_back("--overwrite");
+    const ToolRun overwritten = sweep(anew);
+    ASSERT_EQ(overwritten.exitCode, 0) << overwritten.err;
+    EXPECT_TRUE(overwritten.out.find("\n0 of 19 results were there already") != std::string::npos)
+        << overwritten.out;
+    EXPECT_EQ(records(out).size(), 19u);
 }
 
 TEST(VlxCompareSweep, KilledSweepGoesOn) {

@@ -1,6 +1,11 @@
 #include "variolux/compare/child_process.h"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
 
 #include "variolux/base/error.h"
 
@@ -25,6 +30,24 @@ TEST(RunCommand, FullPipesDoNotBlock) {
     EXPECT_EQ(run.out.size(), 1000000u);
     EXPECT_EQ(run.err.size(), 4096u);
     EXPECT_TRUE(run.err.ends_with("end\n"));
+}
+
+// A signal while nothing is to be read: what poll() said before it must not be taken for news, or the one
+// pipe is waited for while the other one is full.
+TEST(RunCommand, SignalsDoNotBlock) {
+    struct sigaction action {};
+    struct sigaction before {};
+    action.sa_handler = [](int) {};  // without SA_RESTART
+    ::sigaction(SIGUSR1, &action, &before);
+    const pthread_t self = ::pthread_self();
+    std::thread signals([self] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        ::pthread_kill(self, SIGUSR1);
+    });
+    const ProcessRun run = runCommand("echo one; sleep 0.6; head -c 1000000 /dev/zero >&2; echo two");
+    EXPECT_EQ(run.out, "one\ntwo\n");
+    signals.join();
+    ::sigaction(SIGUSR1, &before, nullptr);
 }
 
 TEST(RunCommand, CountsProcessorTimeAndMemoryOfAllProcesses) {

@@ -91,6 +91,30 @@ TEST(SampleWriter, TilesInAnyOrderFromManyThreadsGiveTheSameBytes) {
     EXPECT_EQ(band.samples(), i);
 }
 
+// Tiles of the same pixels and pass follow each other as they came, whatever other threads add meanwhile.
+TEST(SampleWriter, OverlappingTilesOfAThreadKeepTheirOrder) {
+    const TemporaryFolder folder;
+    const Window window{0, 0, 1, 1};
+    constexpr int kThreads = 8, kTiles = 60;
+    SampleWriter writer(folder / "a.exr", headerOf(window));
+    std::vector<std::thread> threads;
+    for (int t = 0; t < kThreads; ++t)
+        threads.emplace_back([&, t] {
+            for (int i = 0; i < kTiles; ++i) {
+                SampleTile tile = writer.tile(window);
+                tile.add(0, 0, std::array{static_cast<float>(t), static_cast<float>(i), 0.f, 1.f, 0.f});
+                writer.add(std::move(tile));
+            }
+        });
+    for (auto& thread : threads) thread.join();
+    writer.close();
+    const SampleBand band = DumpReader(folder / "a.exr").read(0, 1, {"R", "G"});
+    ASSERT_EQ(band.samples(), std::uint64_t{kThreads} * kTiles);
+    std::array<float, kThreads> next{};
+    for (std::size_t s = 0; s < band.samples(); ++s)
+        EXPECT_EQ(band.values[1][s], next[static_cast<std::size_t>(band.values[0][s])]++);
+}
+
 TEST(SampleWriter, PassesFollowEachOther) {
     const TemporaryFolder folder;
     const Window window{0, 0, 4, 3};

@@ -174,10 +174,11 @@ TEST(Stack, MisfitsAreErrorsThatNameTheFile) {
     EXPECT_NE(message({}), "");
 
     const auto plain = writeImages(folder, 2, {"R", "G", "B"});
-    EXPECT_NE(errorOf([&] {
-                  stackImages(plain, folder / "d.exr", {StackPreset::Cycles, {}, {}, {}});
-              }).find("expected a channel L.Combined.R of some layer L, found R, G, B"),
-              std::string::npos);
+    EXPECT_NE(
+        errorOf([&] {
+            stackImages(plain, folder / "d.exr", {StackPreset::Cycles, {}, {}, {}});
+        }).find("expected a channel L.Combined.R of some layer L, as --preset cycles says, found R, G, B"),
+        std::string::npos);
 }
 
 TEST(Stack, ADumpIsNotAnImage) {
@@ -208,7 +209,7 @@ TEST(Stack, LayersOfRadianceAreKept) {
     options.radiance = {"L.GlossDir"};
     EXPECT_NE(errorOf([&] {
                   stackImages(images, folder / "dump.exr", options);
-              }).find("layer of radiance L.GlossDir, found L.Combined.R"),
+              }).find("layer L.GlossDir for --radiance, found L.Combined.R"),
               std::string::npos);
 }
 

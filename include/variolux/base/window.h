@@ -17,6 +17,17 @@ struct Window {
     bool operator==(const Window&) const = default;
 };
 
+/// Coordinates of pixels are at most this far from 0: OpenEXR takes no others, and sums of two fit an int.
+inline constexpr int kMostCoordinate = 0x3ffffffe;
+
+/// Whether a window has pixels, all of them within kMostCoordinate.
+inline bool isPossible(std::int64_t x, std::int64_t y, std::int64_t width, std::int64_t height) {
+    const auto fits = [](std::int64_t first, std::int64_t count) {
+        return count >= 1 && first >= -kMostCoordinate && first + count - 1 <= kMostCoordinate;
+    };
+    return fits(x, width) && fits(y, height);
+}
+
 /// One of `count` bands of nearly equal numbers of rows that a window is cut into, from the top.
 struct Band {
     int index = 0;  ///< from 0

@@ -69,6 +69,7 @@ struct SweepOptions {
     int threads = 0;
     int inspectedRegions = 64;  ///< spread evenly; a quarter as many with the largest errors are added
     bool keepDumps = false;
+    bool overwrite = false;  ///< run again what is in the folder already
 };
 
 /// How a dump came about.

@@ -57,6 +57,13 @@ const std::vector<DumpChannel>& standardChannels();
 /// of many. Negative: not known. The variance of the mean of a pixel's n samples is their sum divided by n^2.
 inline constexpr std::string_view kVarianceChannels[] = {"variance.R", "variance.G", "variance.B"};
 
+/// The number of a replicate that a value of channel sample.replicate stands for: a whole number below 2^32.
+/// Nothing for any other value; readers refuse files that have one.
+std::optional<std::uint32_t> replicateNumber(float value);
+
+/// Lets `header` say what the dump is made of (kInputsAttribute of base/image_io.h): nothing when empty.
+void setInputs(DumpHeader& header, const std::string& inputs);
+
 /// Position of a channel in `header`, or -1.
 int findChannel(const DumpHeader& header, std::string_view name);
 

@@ -6,6 +6,7 @@
 
 #include "variolux/base/progress.h"
 #include "variolux/dump/format.h"
+#include "variolux/dump/positions.h"
 
 namespace vlx {
 
@@ -31,6 +32,8 @@ struct DumpInfo {
     std::uint64_t emptyPixels = 0;       ///< pixels without samples
     std::uint64_t nonFiniteSamples = 0;  ///< samples with a NaN or infinite R, G or B
     std::uint32_t replicates = 0;        ///< different values of sample.replicate; 0 without the channel
+    PositionReport positions;            ///< without samples where the dump has no positions
+    std::string layers;                  ///< layersFoundBy(): why these may be no samples of the camera
     std::vector<MissingPart> missing;
 };
 

@@ -22,7 +22,8 @@ class SampleSource {
 
     /// Samples of rows [y, y + rows), in any order of calls, one at a time, of the named channels only, in
     /// the given order (all of the header's when empty). Throws Error on rows outside the data window, on
-    /// unknown channels, and on what is wrong with a file.
+    /// unknown channels, and on what is wrong with a file. Values of sample.replicate are such that
+    /// replicateNumber() knows them.
     virtual SampleBand read(int y, int rows, const std::vector<std::string>& channels = {}) const = 0;
 
     /// Numbers of samples of rows [y, y + rows), pixel by pixel. Same errors.

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "variolux/base/window.h"
+
+namespace vlx {
+
+/// Memory of this machine, or less where this process may take less (ulimit -v).
+std::uint64_t availableMemory();
+
+/// Throws Error, naming `path`, when `bytes` for `what` are more than there are. Systems promise more memory
+/// than they have, and end the process that takes it.
+void requireMemory(std::string_view path, std::uint64_t bytes, std::string_view what);
+
+/// Of an image of floats.
+inline std::uint64_t imageBytes(const Window& window, std::size_t channels) {
+    return static_cast<std::uint64_t>(window.pixels()) * channels * sizeof(float);
+}
+
+}  // namespace vlx
