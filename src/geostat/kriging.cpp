@@ -5,17 +5,11 @@
 #include <numeric>
 #include <sstream>
 
+#include "entry_error.h"
 #include "kernels.h"
 #include "kriging_names.h"
 
 namespace vlx {
-namespace {
-
-constexpr double kEntryRounding = 4 * kEpsilon;
-constexpr double kCoordinateRounding = 8 * kEpsilon;  // of a transformed coordinate
-
-}  // namespace
-
 /// One target: a point, or the points of a block with weights that sum to 1.
 struct KrigingSystem::Block {
     MatrixXd points;   // k x d
@@ -82,25 +76,12 @@ MatrixXd KrigingSystem::driftRows(const MatrixXd& points, const MatrixXd& extern
     return rows;
 }
 
-/// How much an error of distances of `rounding` times the places' size changes a semivariance, relative to
-/// the sill. Distances without a transform are exact to rounding. |gamma(h + d) - gamma(h)| is at most
-/// gamma(d) where gamma is concave, d / range for the smoother structures.
-double KrigingSystem::placeError(double rounding) const {
-    if (problem_.transform.size() == 0 || structureSill_ == 0) return 0;
-    double error = 0;
-    for (const VariogramStructure& s : model_.structures)
-        error += s.sill * std::max(rounding / s.range, unitSemivariance(s.type, s.shape, rounding / s.range));
-    return error / structureSill_;
-}
-
-/// Of the covariance matrix, relative to its diagonal: a few roundings an entry, twice as many for
-/// increments.
+/// Of the covariance matrix, relative to its diagonal. Increments add up to four semivariances.
 double KrigingSystem::entryError() const {
-    const double size = places_.size() > 0 ? places_.cwiseAbs().maxCoeff() : 0;
-    const double places = structureSill_ * placeError(kCoordinateRounding * size);
-    if (!report_.generalisedCovariance)
-        return kEntryRounding + (structureSill_ > 0 ? places / structureSill_ : 0);
-    return 2 * kEntryRounding + places / level_;
+    const bool transformed = problem_.transform.size() > 0 && places_.size() > 0;
+    const double places = transformed ? placeError(model_, places_.cwiseAbs().maxCoeff()) : 0;
+    if (report_.generalisedCovariance) return 2 * kEntryRounding + places / level_;
+    return kEntryRounding + (structureSill_ > 0 ? places / structureSill_ : 0);
 }
 
 void KrigingSystem::assemble() {
@@ -250,9 +231,10 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
             }
             if (!generalised) within += target.weights[a] * target.weights[a] * structureSill_;
         }
-        const double reach = std::max(places.cwiseAbs().maxCoeff(), places_.cwiseAbs().maxCoeff());
-        lower.entryError[t] = kEntryRounding * (generalised ? 4 * level_ + 3 * outward : structureSill_) +
-                              structureSill_ * placeError(kCoordinateRounding * reach);
+        lower.entryError[t] = kEntryRounding * (generalised ? 4 * level_ + 3 * outward : structureSill_);
+        if (problem_.transform.size() > 0)
+            lower.entryError[t] +=
+                placeError(model_, std::max(places.cwiseAbs().maxCoeff(), places_.cwiseAbs().maxCoeff()));
         lower.variance[t] = within;
         if (generalised)
             lower.variance[t] = (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +

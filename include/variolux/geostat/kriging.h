@@ -149,7 +149,6 @@ class KrigingSystem {
     void mergeGroups(const std::vector<std::pair<double, Eigen::Index>>& sums);
     void assemble();
     double entryError() const;
-    double placeError(double rounding) const;
     void completeReport();
     Eigen::MatrixXd place(const Eigen::MatrixXd& points) const;
     Eigen::MatrixXd driftRows(const Eigen::MatrixXd& points, const Eigen::MatrixXd& external) const;
