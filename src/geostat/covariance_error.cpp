@@ -70,6 +70,12 @@ CovarianceSystem::Bounds CovarianceSystem::quickBounds(const Solution& solution,
                                  (rounding * w + left * std::sqrt(n)) * z[k];
         out.variance[t] = noise * (std::abs(right.variance[t]) + 2 * c * w + 6 * w * w) +
                           given * (1 + 2 * widest * w) + 2 * static_cast<double>(n) * left * left;
+        if (!report_.degenerate) continue;
+        // Data without variance have none to be wrong: relative to the terms themselves.
+        const VectorXd size = solution.weights.col(t).cwiseAbs();
+        const MatrixXd k = MatrixXd(covariance_.selfadjointView<Eigen::Lower>()).cwiseAbs();
+        out.variance[t] = noise * (std::abs(right.variance[t]) +
+                                   2 * size.dot(right.covariance.col(t).cwiseAbs()) + size.dot(k * size));
     }
     return out;
 }

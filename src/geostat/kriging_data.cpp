@@ -33,6 +33,7 @@ bool KrigingSystem::validate() {
         report_.message = std::move(message);
         return false;
     };
+    if (problem.drift.axes == 0) problem.drift.axes = d;
     if (const auto broken = problem.model.validate()) return fail("model: " + *broken);
     const bool shapes = (d > 0 || n == 0) && problem.values.rows() == n &&
                         (problem.errorVariances.size() == 0 || problem.errorVariances.size() == n) &&
@@ -64,7 +65,6 @@ bool KrigingSystem::validate() {
         if (!(problem.errorVariances[i] >= 0))
             return fail(invalidDatum(i, "error variance", problem.errorVariances[i], ">= 0"));
     }
-    if (problem.drift.axes == 0) problem.drift.axes = d;
     if (!problem.model.bounded() && constantColumn() < 0)
         return fail("an unbounded variogram needs a constant among the drift functions");
     return true;

@@ -8,7 +8,7 @@
 namespace vlx {
 
 DriftEstimate KrigingSystem::drift() const {
-    const Index p = driftColumns();
+    const Index p = std::max(Index{0}, driftColumns());
     DriftEstimate out;
     if (!report_.ok()) {
         out.coefficients = out.coefficientError = MatrixXd::Constant(p, problem_.values.cols(), kNaN);

@@ -70,7 +70,7 @@ void KrigingSystem::predictPrecisely(const KrigingTargets& targets, const Krigin
         const Index t = which[k], row = static_cast<Index>(k);
         TargetStatus& status = prediction.status[static_cast<std::size_t>(t)];
         if (driftAlone_) status = TargetStatus::Inaccurate;
-        if (answer.digits <= prediction.digits && answer.accurate.empty()) continue;
+        if (answer.accurate.empty()) continue;
         prediction.estimate.row(t) = answer.estimate.row(row);
         prediction.variance[t] = std::max(0.0, answer.variance[row]);
         prediction.estimateError.row(t) = answer.estimateError.row(row);

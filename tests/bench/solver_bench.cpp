@@ -175,6 +175,7 @@ void errorTable() {
             for (Index i = 0; i < 40; ++i)
                 p.values.row(i).setConstant(std::sin(3 * p.positions(i, 0)) +
                                             std::cos(2 * p.positions(i, 1)));
+            p.accuracy.mostDigits = 16;  // what double precision alone does
             const Eigen::Vector2d wanted = exact(p, targets);
             const MatrixXd matrix = covarianceMatrix(p);
             // The field's own covariance has eigenvalues down to 1e-20: the error variance is the smallest.

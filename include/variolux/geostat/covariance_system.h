@@ -55,10 +55,10 @@ enum class KrigingPrecision { Double, Single };
 /// variances: the field's variance), or a few units of the answer's last place.
 ///
 /// Where the bound of the error is larger, KrigingSystem solves the system again with 50, 100, 200, 400
-/// decimal digits, covariances included, until two answers in a row agree. It costs: 400 to 2000 times the
-/// time of double precision with 50 digits.
+/// decimal digits, covariances included, until two answers in a row agree. That takes some thousand times as
+/// long (tests/bench/solver_bench.cpp measures it).
 struct KrigingAccuracy {
-    double tolerance = 1e-9;
+    double tolerance = 1e-9;      ///< >= 0
     int mostDigits = 400;         ///< decimal digits to go to; below 50: double precision only
     Eigen::Index mostData = 512;  ///< larger systems stay in double precision
 };
@@ -73,9 +73,9 @@ struct KrigingReport {
     Eigen::Index merged = 0;   ///< data that were folded into a coincident one
     Eigen::Index ignored = 0;  ///< data of infinite error variance
     int droppedDrift = 0;      ///< linearly dependent drift columns
-    double jitter = 0;         ///< added to the unit diagonal (relative to each datum's variance)
-    bool indefinite = false;   ///< the jitter needed exceeds rounding: the covariances are not a covariance
-    bool degenerate = false;   ///< some datum has no variance at all (zero sill and zero error)
+    double jitter = 0;  ///< added to the double factor's unit diagonal (relative to each datum's variance)
+    bool indefinite = false;  ///< the jitter needed exceeds rounding: the covariances are not a covariance
+    bool degenerate = false;  ///< some datum has no variance at all (zero sill and zero error)
     bool generalisedCovariance = false;  ///< increments instead of covariances: long ranges, unbounded models
     bool singlePrecision = false;        ///< the factor in use is float
     double conditionEstimate = 0;        ///< of the equilibrated matrix, usually within a factor n

@@ -73,7 +73,7 @@ struct KrigingProblem {
     /// identity.
     Eigen::MatrixXd transform;
     KrigingPrecision precision = KrigingPrecision::Double;
-    KrigingAccuracy accuracy;
+    KrigingAccuracy accuracy;  ///< of estimates, variances, drift and leave-one-out
 };
 
 /// Where to predict: points, or averages of Z over blocks (change of support).
