@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "batch_kernel.h"
 #include "entry_error.h"
@@ -19,12 +18,9 @@ class LaneBounds {
     LaneBounds(const Batch& b, Eigen::Index lane, const KrigingProblem& problem, double placeError,
                double lowest)
         : b_(b), lane_(lane), n_(static_cast<double>(b.n)), sill_(problem.model.sill()) {
-        double least = std::numeric_limits<double>::infinity();
-        for (Eigen::Index i = 0; i < problem.positions.rows(); ++i) {
-            const double own = at(b.diagonal, i), variance = own + sill_ - problem.model.nugget;
-            least = std::min(least, own / variance);
-            smallestVariance_ = std::min(smallestVariance_, variance);
-        }
+        const double error = problem.errorVariances.size() > 0 ? problem.errorVariances.minCoeff() : 0;
+        smallestVariance_ = sill_ + error;
+        const double least = (problem.model.nugget + error) / smallestVariance_;
         inverse_ = std::min(std::sqrt(n_) / lowest, 1 / least);
         noise_ = kEntryRounding + placeError / sill_ + kEpsilon * std::sqrt(n_);
     }
@@ -33,12 +29,8 @@ class LaneBounds {
         return std::sqrt(n_ * inverse_) * (std::sqrt(std::max(0.0, variance)) + std::sqrt(sill_));
     }
     double estimate(Eigen::Index column, double weights) const {
-        double squares = 0;
-        for (Eigen::Index i = 0; i < b_.n; ++i) {
-            const double y = at(b_.matrix, (b_.valueRow() + column) * b_.n + i);
-            squares += y * y;
-        }
-        const double norm = std::sqrt(squares);
+        const auto at = static_cast<std::size_t>(column * b_.lanes + lane_);
+        const double norm = std::sqrt(b_.squares[at]);
         return noise_ * std::sqrt(n_ * inverse_) * norm * (6 * weights + 2 * std::sqrt(sill_)) +
                kEpsilon * std::sqrt(n_) * weights * norm;
     }
@@ -48,14 +40,10 @@ class LaneBounds {
     double smallestVariance() const { return smallestVariance_; }
 
   private:
-    double at(const std::vector<double>& array, Eigen::Index entry) const {
-        return array[static_cast<std::size_t>(entry * b_.lanes + lane_)];
-    }
-
     const Batch& b_;
     Eigen::Index lane_;
     double n_, sill_;
-    double inverse_ = 1, noise_ = 0, smallestVariance_ = std::numeric_limits<double>::infinity();
+    double inverse_ = 1, noise_ = 0, smallestVariance_ = 0;
 };
 
 }  // namespace vlx::kernels

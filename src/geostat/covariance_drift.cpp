@@ -31,7 +31,7 @@ DriftEstimate CovarianceSystem::drift() const {
     const MatrixXd covariance = v.transpose() * (covariance_.selfadjointView<Eigen::Lower>() * v);
 
     // In the internal basis, where L^-1 F has columns of norm 1 to 2 and variances are 1/4 at least.
-    Bounds bounds = quickBounds(solution, right);
+    Bounds bounds = quickBounds(solution, right, dualNormsAtMost());
     const auto accurate = [&] {
         bool all =
             (bounds.variance.array() <= tolerance_ * covariance.diagonal().transpose().array().max(0.25))

@@ -47,9 +47,24 @@ bool CovarianceSystem::boundable() const {
     return report_.jitter == 0 && entryNoise() * report_.conditionEstimate * std::sqrt(n) < 0.1;
 }
 
-/// Bounds that cost nothing, from the condition estimate. Entries of the equilibrated matrix are at most 2,
+/// Bounds of the dual weights' 1-norms that cost nothing: |y|_1 <= sqrt(n) |L^-T| |L'y|.
+RowVectorXd CovarianceSystem::dualNormsAtMost() const {
+    return std::sqrt(static_cast<double>(covariance_.rows()) * inverseNorm()) * dualNorm_;
+}
+
+/// The norms themselves, for a triangular solve.
+RowVectorXd CovarianceSystem::dualNorms() const {
+    if (covariance_.rows() == 0) return dualNorm_;
+    MatrixXd y = carriedRows(driftColumns_, values_.cols());
+    y -= q_.lazyProduct(q_.transpose().lazyProduct(y).eval());
+    solveUpper(y);
+    return y.colwise().lpNorm<1>();
+}
+
+/// Bounds from norms of primal weights and of dual ones, y. Entries of the equilibrated matrix are at most 2,
 /// those of F m at most |c0| + |K w|, and those of F b at most |z| + |K y|, which makes 6 of 2.
-CovarianceSystem::Bounds CovarianceSystem::quickBounds(const Solution& solution, const Right& right) const {
+CovarianceSystem::Bounds CovarianceSystem::quickBounds(const Solution& solution, const Right& right,
+                                                       const RowVectorXd& y) const {
     const Index n = covariance_.rows(), m = right.covariance.cols(), columns = values_.cols();
     const auto pivots = r_.diagonal().cwiseAbs();
     const bool independent = kept_.empty() || pivots.minCoeff() > kIndependent * pivots.maxCoeff();
@@ -59,7 +74,6 @@ CovarianceSystem::Bounds CovarianceSystem::quickBounds(const Solution& solution,
     if (n == 0) return out;
     const double noise = entryNoise(), widest = scale_.maxCoeff();
     const double rounding = kEpsilon * std::sqrt(static_cast<double>(n));
-    const RowVectorXd y = std::sqrt(static_cast<double>(n) * inverseNorm()) * dualNorm_;
     const RowVectorXd z = values_.colwise().lpNorm<Eigen::Infinity>();
     for (Index t = 0; t < m; ++t) {
         const double w = solution.weights.col(t).lpNorm<1>();

@@ -166,7 +166,7 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
     RowVectorXd noise = RowVectorXd::Zero(m);
     if (targets.entryError.size() == m) noise = targets.entryError.transpose();
     const Right right{c0, f0.kept, targets.variance.transpose(), noise};
-    Bounds bounds = quickBounds(solution, right);
+    Bounds bounds = quickBounds(solution, right, dualNormsAtMost());
     RowVectorXd variance = targets.variance.transpose() - solution.explained;
     if (careful()) {
         const MatrixXd kv = covariance_.selfadjointView<Eigen::Lower>() * v;
@@ -184,9 +184,15 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
             all = all && valueScale_[c] * bounds.estimate(c, t) <= allowedEstimateError(c, estimate(t, c));
         return all;
     };
-    bool close = true;
-    for (Index t = 0; t < m && close; ++t) close = !finite[static_cast<std::size_t>(t)] || allowed(t);
-    if (!close && boundable() && !report_.degenerate) bounds = closeBounds(solution, right);
+    const auto allAllowed = [&] {
+        for (Index t = 0; t < m; ++t)
+            if (finite[static_cast<std::size_t>(t)] && !allowed(t)) return false;
+        return true;
+    };
+    if (boundable() && !allAllowed()) {
+        bounds = quickBounds(solution, right, dualNorms());
+        if (!report_.degenerate && !allAllowed()) bounds = closeBounds(solution, right);
+    }
 
     for (Index t = 0; t < m; ++t) {
         const auto at = static_cast<std::size_t>(t);

@@ -221,7 +221,9 @@ class CovarianceSystem {
     bool careful() const;
     bool boundable() const;
     double inverseNorm() const;
-    Bounds quickBounds(const Solution& solution, const Right& right) const;
+    Eigen::RowVectorXd dualNormsAtMost() const;
+    Eigen::RowVectorXd dualNorms() const;
+    Bounds quickBounds(const Solution& solution, const Right& right, const Eigen::RowVectorXd& y) const;
     Bounds closeBounds(const Solution& solution, const Right& right) const;
     double smallestVariance() const;
     CovarianceSystem inDouble() const;
