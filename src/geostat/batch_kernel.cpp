@@ -153,6 +153,10 @@ template <class V>
     V sill{};
     for (std::size_t s = 0; s < b.types.size(); ++s)
         sill += load<V>(b.sill.data() + static_cast<Index>(s) * w);
+    for (Index c = 0; c < b.columns; ++c) {
+        const double* y = b.row(b.valueRow() + c);
+        store(b.squares.data() + c * w, dot<V>(y, y, b.n));
+    }
     for (Index t = 0; t < b.targets; ++t) {
         const double* k = b.row(b.targetRow() + t);
         for (Index c = 0; c < b.columns; ++c)
@@ -219,6 +223,7 @@ void Batch::resize() {
     matrix.assign(size(rows * n), 0);
     estimate.assign(size(targets * columns), 0);
     variance.assign(size(targets), 0);
+    squares.assign(size(columns), 0);
     for (auto* v : {&lowest, &dependence}) v->assign(size(1), 0);
 }
 

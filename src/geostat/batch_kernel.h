@@ -36,6 +36,7 @@ struct Batch {
 
     std::vector<double> estimate;  ///< [target][column]
     std::vector<double> variance;  ///< [target], not clamped
+    std::vector<double> squares;   ///< [column]: |L^-1 z|^2
     std::vector<double>
         lowest;  ///< smallest pivot relative to its variance; below 0: needs the general solver
     std::vector<double> dependence;  ///< smallest norm of a drift column after orthogonalisation, relative

@@ -1,4 +1,4 @@
-// CovarianceSystem's answers: weights, predictions, drift, leave-one-out.
+// CovarianceSystem's answers: weights and predictions.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -123,7 +123,7 @@ CovarianceSystem::Solution CovarianceSystem::solve(const MatrixXd& c0, const Mat
         const double change = (correction.weights.colwise().norm().array() /
                                out.weights.colwise().norm().array().max(std::numeric_limits<double>::min()))
                                   .maxCoeff();
-        out.converged = change < 1e-12;
+        out.change = change;
         if (change < 1e-15 || !(change < last)) break;
         last = change;
     }
@@ -136,6 +136,8 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
     KrigingPrediction out;
     out.estimate = MatrixXd::Constant(m, columns, kNaN);
     out.variance = VectorXd::Constant(m, kNaN);
+    out.estimateError = out.estimate;
+    out.varianceError = out.variance;
     if (options.weights) out.weights = MatrixXd::Constant(m, report_.used, kNaN);
     out.status.assign(static_cast<std::size_t>(m), TargetStatus::InvalidTarget);
     const bool shapes = targets.covariance.rows() == n && targets.variance.size() == m &&
@@ -158,13 +160,40 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
     }
     const TargetDrift f0 = targetDrift(drift);
     const Solution solution = solve(c0, f0.kept);
-    if (report_.singlePrecision && !solution.converged) return inDouble().predict(targets, options);
+    if (report_.singlePrecision && !(solution.change < kConverged))
+        return inDouble().predict(targets, options);
     const MatrixXd& v = solution.weights;
+    RowVectorXd noise = RowVectorXd::Zero(m);
+    if (targets.entryError.size() == m) noise = targets.entryError.transpose();
+    const Right right{c0, f0.kept, targets.variance.transpose(), noise};
+    Bounds bounds = quickBounds(solution, right, dualNormsAtMost());
     RowVectorXd variance = targets.variance.transpose() - solution.explained;
     if (careful()) {
         const MatrixXd kv = covariance_.selfadjointView<Eigen::Lower>() * v;
         variance = targets.variance.transpose() + v.cwiseProduct(kv - 2 * c0).colwise().sum();
     }
+    MatrixXd estimate(m, columns);
+    for (Index t = 0; t < m; ++t)
+        for (Index c = 0; c < columns; ++c)
+            estimate(t, c) = reference_[c] * f0.constant[t] + v.col(t).dot(values_.col(c)) * valueScale_[c];
+    const double least = smallestVariance();
+    const auto allowed = [&](Index t) {
+        bool all =
+            bounds.variance[t] <= allowedVarianceError(variance[t], std::max(right.variance[t], least));
+        for (Index c = 0; c < columns; ++c)
+            all = all && valueScale_[c] * bounds.estimate(c, t) <= allowedEstimateError(c, estimate(t, c));
+        return all;
+    };
+    const auto allAllowed = [&] {
+        for (Index t = 0; t < m; ++t)
+            if (finite[static_cast<std::size_t>(t)] && !allowed(t)) return false;
+        return true;
+    };
+    if (boundable() && !allAllowed()) {
+        bounds = quickBounds(solution, right, dualNorms());
+        if (!report_.degenerate && !allAllowed()) bounds = closeBounds(solution, right);
+    }
+
     for (Index t = 0; t < m; ++t) {
         const auto at = static_cast<std::size_t>(t);
         if (!finite[at]) continue;
@@ -173,72 +202,21 @@ KrigingPrediction CovarianceSystem::predict(const CovarianceTargets& targets,
             out.status[at] = TargetStatus::Exact;
             out.estimate.row(t) = rawValues_.row(datum);
             out.variance[t] = 0;
+            out.estimateError.row(t).setZero();
+            out.varianceError[t] = 0;
             if (options.weights) out.weights.row(t) = RowVectorXd::Unit(n, datum);
             continue;
         }
-        out.status[at] = f0.estimable[at] ? TargetStatus::Ok : TargetStatus::NotEstimable;
-        for (Index c = 0; c < columns; ++c)
-            out.estimate(t, c) =
-                reference_[c] * f0.constant[t] + v.col(t).dot(values_.col(c)) * valueScale_[c];
+        out.status[at] = !f0.estimable[at] ? TargetStatus::NotEstimable
+                         : allowed(t)      ? TargetStatus::Ok
+                                           : TargetStatus::Inaccurate;
+        out.estimate.row(t) = estimate.row(t);
+        out.estimateError.row(t) = bounds.estimate.col(t).transpose().cwiseProduct(valueScale_) +
+                                   2 * kEpsilon * estimate.row(t).cwiseAbs();
+        out.varianceError[t] = bounds.variance[t] + 2 * kEpsilon * std::abs(variance[t]);
         out.lowestVariance = std::min(out.lowestVariance, variance[t]);
         out.variance[t] = std::max(0.0, variance[t]);
         if (options.weights) out.weights.row(t) = v.col(t).cwiseProduct(scale_).transpose();
-    }
-    return out;
-}
-
-DriftEstimate CovarianceSystem::drift() const {
-    const Index p = driftColumns_, columns = rawValues_.cols();
-    DriftEstimate out{MatrixXd::Zero(p, columns), MatrixXd::Zero(p, p)};
-    if (!report_.ok() || p == 0) return out;
-    const auto rank = static_cast<Index>(kept_.size());
-    const Solution solution = solve(MatrixXd::Zero(covariance_.rows(), rank), MatrixXd::Identity(rank, rank));
-    if (report_.singlePrecision && !solution.converged) return inDouble().drift();
-    const MatrixXd& v = solution.weights;
-    const MatrixXd beta = v.transpose() * values_;
-    const MatrixXd covariance = v.transpose() * (covariance_.selfadjointView<Eigen::Lower>() * v);
-    // F_internal = F M, so beta = M beta_internal.
-    MatrixXd map = MatrixXd::Zero(p, rank);
-    for (Index j = 0; j < rank; ++j) {
-        const Index column = kept_[static_cast<std::size_t>(j)];
-        if (column == constantColumn_) {
-            map(column, j) = columnScale_[column] / constant_;
-        } else {
-            map(column, j) = columnScale_[column];
-            if (constantColumn_ >= 0)
-                map(constantColumn_, j) -= centre_[column] * columnScale_[column] / constant_;
-        }
-    }
-    out.coefficients = map * beta * valueScale_.asDiagonal();
-    if (constantColumn_ >= 0) out.coefficients.row(constantColumn_) += reference_ / constant_;
-    out.covariance = map * covariance * map.transpose();
-    return out;
-}
-
-LeaveOneOut CovarianceSystem::leaveOneOut() const {
-    const Index n = rawValues_.rows(), columns = rawValues_.cols();
-    LeaveOneOut out;
-    out.estimate = MatrixXd::Constant(n, columns, kNaN);
-    out.variance = VectorXd::Constant(n, kNaN);
-    out.status.assign(static_cast<std::size_t>(n), TargetStatus::NotEstimable);
-    if (!report_.ok() || n == 0) return out;
-    if (report_.singlePrecision) return inDouble().leaveOneOut();
-    // Q = W'W with W = (I - Q_drift Q_drift') L^-1: a sum of squares, nothing cancels.
-    MatrixXd w = MatrixXd::Identity(n, n);
-    solveLower(w);
-    const RowVectorXd full = w.colwise().squaredNorm();
-    w -= q_ * (q_.transpose() * w);
-    MatrixXd y = values_;
-    solveLower(y);
-    y -= q_ * (q_.transpose() * y);
-    const MatrixXd qz = w.transpose() * y;
-    for (Index i = 0; i < n; ++i) {
-        const double qii = w.col(i).squaredNorm();
-        if (!(qii > 1e-22 * full[i])) continue;
-        out.status[static_cast<std::size_t>(i)] = TargetStatus::Ok;
-        out.variance[i] = 1 / (qii * scale_[i] * scale_[i]);
-        const RowVectorXd residual = qz.row(i).cwiseProduct(valueScale_) / (qii * scale_[i]);
-        out.estimate.row(i) = rawValues_.row(i) - residual;
     }
     return out;
 }

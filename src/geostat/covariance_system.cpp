@@ -42,10 +42,13 @@ CovarianceSystem::CovarianceSystem(CovarianceProblem problem) {
     driftColumns_ = problem.drift.cols();
     rawValues_ = std::move(problem.values);
     report_.used = problem.covariance.rows();
+    entryError_ = problem.entryError;
+    tolerance_ = problem.tolerance;
     if (!validate(problem)) return;
     covariance_ = std::move(problem.covariance);
     equilibrate();
     centreDrift(problem.drift);
+    centreValues();
     if (problem.precision == KrigingPrecision::Double || !factoriseSingle() || !decomposeDrift()) {
         report_.singlePrecision = false;
         factorSingle_.resize(0, 0);
@@ -53,7 +56,6 @@ CovarianceSystem::CovarianceSystem(CovarianceProblem problem) {
         if (!report_.ok()) return;
         decomposeDrift();
     }
-    centreValues();
     describe();
 }
 
@@ -135,12 +137,13 @@ void CovarianceSystem::centreDrift(const MatrixXd& drift) {
     }
 }
 
-/// The matrix to factorise, with the drift's columns as rows below it: the factorisation carries them along.
+/// The matrix to factorise, with the drift's and the values' columns as rows below it: the factorisation
+/// carries them along.
 template <class Scalar>
 double CovarianceSystem::factoriseWith(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& factor,
                                        double jitter) const {
-    const Index n = covariance_.rows(), p = driftColumns_;
-    const Index leading = kernels::leadingDimension(n + p);
+    const Index n = covariance_.rows(), p = driftColumns_, c = values_.cols();
+    const Index leading = kernels::leadingDimension(n + p + c);
     factor.resize(leading, n);
     for (Index j = 0; j < n; ++j) {
         // Vectors of rows begin above the diagonal and end below the last row: both must be finite.
@@ -148,11 +151,12 @@ double CovarianceSystem::factoriseWith(Eigen::Matrix<Scalar, Eigen::Dynamic, Eig
         factor.col(j).segment(begin, j - begin).setZero();
         factor.col(j).segment(j, n - j) = covariance_.col(j).tail(n - j).template cast<Scalar>();
         factor.col(j).segment(n, p) = drift_.row(j).transpose().template cast<Scalar>();
-        factor.col(j).tail(leading - n - p).setZero();
+        factor.col(j).segment(n + p, c) = values_.row(j).transpose().template cast<Scalar>();
+        factor.col(j).tail(leading - n - p - c).setZero();
         const double diagonal = covariance_(j, j) > 0 ? covariance_(j, j) : 1;
         factor(j, j) = static_cast<Scalar>(diagonal * (1 + jitter));
     }
-    return static_cast<double>(kernels::cholesky(factor.data(), n, n + p, leading));
+    return static_cast<double>(kernels::cholesky(factor.data(), n, n + p + c, leading));
 }
 
 /// ||K^-1|| >= ||L^-T e_k||^2 with k the smallest pivot, ||K|| <= trace; their product is usually between the
@@ -211,8 +215,25 @@ bool CovarianceSystem::careful() const {
            report_.conditionEstimate > kLargestPlainCondition;
 }
 
+MatrixXd CovarianceSystem::carriedRows(Index first, Index count) const {
+    const Index row = covariance_.rows() + first;
+    if (report_.singlePrecision) return factorSingle_.middleRows(row, count).transpose().cast<double>();
+    return factor_.middleRows(row, count).transpose();
+}
+
 /// False if the drift's columns are too nearly dependent for a float factor.
 bool CovarianceSystem::decomposeDrift() {
+    if (!orthogonaliseDrift()) return false;
+    const Index columns = values_.cols();
+    dualNorm_ = RowVectorXd::Zero(columns);
+    if (covariance_.rows() == 0) return true;
+    MatrixXd y = carriedRows(driftColumns_, columns);
+    y -= q_.lazyProduct(q_.transpose().lazyProduct(y).eval());
+    dualNorm_ = y.colwise().norm();
+    return true;
+}
+
+bool CovarianceSystem::orthogonaliseDrift() {
     const Index n = covariance_.rows(), p = driftColumns_;
     kept_.clear();
     dropped_.clear();
@@ -220,8 +241,7 @@ bool CovarianceSystem::decomposeDrift() {
         q_ = keptDrift_ = MatrixXd(n, 0);
         return true;
     }
-    MatrixXd a = report_.singlePrecision ? MatrixXd(factorSingle_.middleRows(n, p).transpose().cast<double>())
-                                         : MatrixXd(factor_.middleRows(n, p).transpose());
+    MatrixXd a = carriedRows(0, p);
     for (Index j = 0; j < p; ++j) {
         const double norm = a.col(j).norm();
         const double scale = norm > 0 ? 1 / powerOfTwo(norm) : 1;
@@ -261,6 +281,7 @@ void CovarianceSystem::centreValues() {
     const Index n = rawValues_.rows(), columns = rawValues_.cols();
     reference_ = RowVectorXd::Zero(columns);
     valueScale_ = RowVectorXd::Ones(columns);
+    spread_ = RowVectorXd::Zero(columns);
     values_.resize(n, columns);
     for (Index c = 0; c < columns; ++c) {
         const auto z = rawValues_.col(c);
@@ -275,6 +296,7 @@ void CovarianceSystem::centreValues() {
             (z.array() / valueScale_[c] - mean).abs().minCoeff(&nearest);
             reference_[c] = z[nearest];
         }
+        if (n > 0) spread_[c] = (z.array() - reference_[c]).abs().maxCoeff();
         values_.col(c) = scale_.array() * (z.array() / valueScale_[c] - reference_[c] / valueScale_[c]);
     }
 }

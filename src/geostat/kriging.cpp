@@ -5,11 +5,11 @@
 #include <numeric>
 #include <sstream>
 
+#include "entry_error.h"
 #include "kernels.h"
 #include "kriging_names.h"
 
 namespace vlx {
-
 /// One target: a point, or the points of a block with weights that sum to 1.
 struct KrigingSystem::Block {
     MatrixXd points;   // k x d
@@ -31,37 +31,43 @@ KrigingTargets blockTargets(const MatrixXd& centres, const MatrixXd& offsets, co
     return targets;
 }
 
-KrigingSystem::KrigingSystem(const KrigingProblem& problem) {
-    if (!validate(problem)) {
+KrigingSystem::KrigingSystem(const KrigingProblem& problem) : problem_(problem) {
+    if (!validate()) {
         report_.status = KrigingStatus::InvalidInput;
         return;
     }
-    chooseScales(problem);
+    chooseScales();
     merge();
-    assemble(problem.precision);
+    assemble();
     completeReport();
 }
 
 /// Scaled and transformed coordinates, one point a row. Untransformed coordinates are scaled but not
 /// centred: their differences are then as exact as the input.
 MatrixXd KrigingSystem::place(const MatrixXd& points) const {
-    if (transform_.size() == 0) return points * coordinateScale_;
-    return (points.rowwise() - origin_.transpose()) * (coordinateScale_ * transform_).transpose();
+    if (problem_.transform.size() == 0) return points * coordinateScale_;
+    return (points.rowwise() - origin_.transpose()) * (coordinateScale_ * problem_.transform).transpose();
+}
+
+Index KrigingSystem::driftColumns() const {
+    const Index d = problem_.drift.axes;
+    Index columns = problem_.drift.external.cols();
+    if (problem_.drift.polynomial != DriftPolynomial::None) columns += 1;
+    if (problem_.drift.polynomial >= DriftPolynomial::Linear) columns += d;
+    if (problem_.drift.polynomial == DriftPolynomial::Quadratic) columns += d * (d + 1) / 2;
+    return columns;
 }
 
 MatrixXd KrigingSystem::driftRows(const MatrixXd& points, const MatrixXd& external) const {
-    const Index m = points.rows(), d = drift_.axes;
-    Index columns = 0;
-    if (drift_.polynomial != DriftPolynomial::None) columns = 1;
-    if (drift_.polynomial >= DriftPolynomial::Linear) columns += d;
-    if (drift_.polynomial == DriftPolynomial::Quadratic) columns += d * (d + 1) / 2;
+    const Index m = points.rows(), d = problem_.drift.axes;
+    const Index columns = driftColumns() - external.cols();
     MatrixXd rows(m, columns + external.cols());
     rows.rightCols(external.cols()) = external;
     if (columns > 0) rows.col(0).setOnes();
     if (columns > 1) {
         const MatrixXd x = (points.leftCols(d).rowwise() - origin_.head(d).transpose()) * coordinateScale_;
         rows.middleCols(1, d) = x;
-        if (drift_.polynomial == DriftPolynomial::Quadratic) {
+        if (problem_.drift.polynomial == DriftPolynomial::Quadratic) {
             Index column = 1 + d;
             for (Index a = 0; a < d; ++a)
                 for (Index b = a; b < d; ++b) rows.col(column++) = x.col(a).cwiseProduct(x.col(b));
@@ -70,13 +76,23 @@ MatrixXd KrigingSystem::driftRows(const MatrixXd& points, const MatrixXd& extern
     return rows;
 }
 
-void KrigingSystem::assemble(KrigingPrecision precision) {
+/// Of the covariance matrix, relative to its diagonal. Increments add up to four semivariances.
+double KrigingSystem::entryError() const {
+    const bool transformed = problem_.transform.size() > 0 && places_.size() > 0;
+    const double places = transformed ? placeError(model_, places_.cwiseAbs().maxCoeff()) : 0;
+    if (report_.generalisedCovariance) return 2 * kEntryRounding + places / level_;
+    return kEntryRounding + (structureSill_ > 0 ? places / structureSill_ : 0);
+}
+
+void KrigingSystem::assemble() {
     const Index n = errors_.size();
     CovarianceProblem problem;
-    problem.precision = precision;
+    problem.precision = problem_.precision;
+    problem.tolerance = problem_.accuracy.tolerance;
     problem.drift = driftRows(positions_.transpose(), external_);
     problem.values = values_;
-    if (problem.drift.cols() == 0 && drift_.mean.size() > 0) problem.values.rowwise() -= drift_.mean;
+    if (problem.drift.cols() == 0 && problem_.drift.mean.size() > 0)
+        problem.values.rowwise() -= problem_.drift.mean;
 
     columns_ = std::make_shared<kernels::ModelColumns>(model_);
     const auto semivariancesTo = [&](const VectorXd& point, Index first, double* out) {
@@ -116,6 +132,7 @@ void KrigingSystem::assemble(KrigingPrecision precision) {
     }
     // Data at one place that were not merged (their external drift differs) share the nugget.
     for (const auto& [i, j] : twins_) k(std::max(i, j), std::min(i, j)) += nugget_;
+    problem.entryError = entryError();
     system_ = CovarianceSystem(std::move(problem));
 }
 
@@ -125,13 +142,15 @@ void KrigingSystem::completeReport() {
     system.ignored = report_.ignored;
     system.generalisedCovariance = report_.generalisedCovariance;
     report_ = system;
-    if (system.ignored == 0 && system.merged == 0 && !system.generalisedCovariance) return;
     std::ostringstream text;
     const auto separate = [&]() -> std::ostream& { return text << (text.tellp() > 0 ? "; " : ""); };
     if (system.ignored > 0) separate() << system.ignored << " data of infinite error variance ignored";
     if (system.merged > 0) separate() << system.merged << " coincident data merged";
     if (system.generalisedCovariance) separate() << "generalised covariance";
     if (!system.message.empty()) separate() << system.message;
+    prepareMoreDigits();
+    if (report_.droppedDrift < system.droppedDrift)
+        separate() << system.droppedDrift - report_.droppedDrift << " of them kept with more digits";
     report_.message = text.str();
 }
 
@@ -154,12 +173,11 @@ KrigingSystem::Block KrigingSystem::block(const KrigingTargets& targets, Index t
     return out;
 }
 
-KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
-                                         const KrigingPredictOptions& options) const {
+CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, KrigingQuantity quantity) const {
     const Index m = targets.count(), n = errors_.size(), q = external_.cols();
     const bool generalised = report_.generalisedCovariance;
-    const bool field = options.quantity == KrigingQuantity::Field;
-    const bool shapes = report_.ok() && targets.points.cols() == dimension_ &&
+    const bool field = quantity == KrigingQuantity::Field;
+    const bool shapes = targets.points.cols() == problem_.positions.cols() &&
                         (targets.weights.size() == 0 || targets.weights.size() == targets.points.rows()) &&
                         (q == 0 || (targets.externalDrift.rows() == m && targets.externalDrift.cols() == q));
 
@@ -167,8 +185,8 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
     lower.covariance = MatrixXd::Zero(n, m);
     lower.variance = VectorXd::Constant(m, kNaN);
     lower.exactDatum.assign(static_cast<std::size_t>(m), -1);
-    const Index columns = driftRows(MatrixXd(0, dimension_), MatrixXd(0, q)).cols();
-    lower.drift = MatrixXd::Zero(m, columns);
+    lower.entryError = VectorXd::Zero(m);
+    lower.drift = MatrixXd::Zero(m, driftColumns());
     const VectorXd centre = place(origin_.transpose()).transpose();
     VectorXd column(places_.rows() + 8);  // whole vectors are written
     for (Index t = 0; shapes && t < m; ++t) {
@@ -179,7 +197,7 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
                              driftRows(target.points, external.replicate(target.points.rows(), 1));
         // Sum of weights that the drift imposes: 1 but for an external constant with another value.
         double sum = 1;
-        if (generalised && drift_.polynomial == DriftPolynomial::None)
+        if (generalised && problem_.drift.polynomial == DriftPolynomial::None)
             sum = external(0, constantColumn()) / external_(0, constantColumn());
         if (generalised && !model_.bounded() && (sum != 1 || !field)) continue;
 
@@ -213,6 +231,10 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
             }
             if (!generalised) within += target.weights[a] * target.weights[a] * structureSill_;
         }
+        lower.entryError[t] = kEntryRounding * (generalised ? 4 * level_ + 3 * outward : structureSill_);
+        if (problem_.transform.size() > 0)
+            lower.entryError[t] +=
+                placeError(model_, std::max(places.cwiseAbs().maxCoeff(), places_.cwiseAbs().maxCoeff()));
         lower.variance[t] = within;
         if (generalised)
             lower.variance[t] = (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +
@@ -228,15 +250,31 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
         }
     }
 
+    return lower;
+}
+
+KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
+                                         const KrigingPredictOptions& options) const {
+    const Index m = targets.count();
+    if (!report_.ok()) {
+        KrigingPrediction none;
+        none.estimate = none.estimateError = MatrixXd::Constant(m, problem_.values.cols(), kNaN);
+        none.variance = none.varianceError = VectorXd::Constant(m, kNaN);
+        if (options.weights) none.weights = MatrixXd::Constant(m, problem_.positions.rows(), kNaN);
+        none.status.assign(static_cast<std::size_t>(m), TargetStatus::InvalidTarget);
+        return none;
+    }
+    const CovarianceTargets lower = lowerTargets(targets, options.quantity);
     KrigingPrediction out = system_.predict(lower, {.weights = options.weights});
     out.variance /= varianceScale_;
+    out.varianceError /= varianceScale_;
     out.lowestVariance /= varianceScale_;
     for (Index t = 0; t < m; ++t) {
         const auto at = static_cast<std::size_t>(t);
         if (out.status[at] == TargetStatus::Exact)
             out.estimate.row(t) = values_.row(lower.exactDatum[at]);
-        else if (columns == 0 && drift_.mean.size() > 0)
-            out.estimate.row(t) += drift_.mean;
+        else if (driftColumns() == 0 && problem_.drift.mean.size() > 0)
+            out.estimate.row(t) += problem_.drift.mean;
     }
     if (options.weights) {
         const MatrixXd merged = std::move(out.weights);
@@ -247,6 +285,7 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
                 out.weights.col(datum) = merged.col(row_[i]) * share_[datum];
             }
     }
+    predictPrecisely(targets, options, lower, out);
     return out;
 }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "batch_kernel.h"
+#include "batch_bounds.h"
 
 namespace vlx {
 namespace {
@@ -14,6 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using kernels::Batch;
+using kernels::LaneBounds;
 
 constexpr Index kMostData = 128;
 constexpr Index kMostDrift = 16;
@@ -92,8 +93,12 @@ class LaneWriter {
         return values(p);
     }
 
-    /// The reference that was subtracted from each value column.
-    const Eigen::RowVectorXd& reference() const { return reference_; }
+    /// The reference that was subtracted from each value column, and the largest difference from it.
+    struct Lane {
+        Eigen::RowVectorXd reference, spread;
+        double placeError = 0;
+    };
+    const Lane& lane() const { return out_; }
 
   private:
     double& at(std::vector<double>& array, Index entry) {
@@ -158,6 +163,9 @@ class LaneWriter {
             }
             squaredExtent += (high - low) * (high - low);
         }
+        if (transformed)
+            out_.placeError =
+                placeError(p.model, std::max(data.cwiseAbs().maxCoeff(), points.cwiseAbs().maxCoeff()));
         // Long ranges lose digits in the covariance form: KrigingSystem has another.
         return b_.drift == 0 ||
                !(semivariance(p.model, std::sqrt(squaredExtent)) - p.model.nugget < 0.1 * sill_);
@@ -216,8 +224,9 @@ class LaneWriter {
     /// exact where values are close.
     bool values(const KrigingProblem& p) {
         const Index n = p.positions.rows();
-        reference_ = Eigen::RowVectorXd::Zero(b_.columns);
-        if (b_.drift == 0 && p.drift.mean.size() > 0) reference_ = p.drift.mean;
+        Eigen::RowVectorXd& reference = out_.reference;
+        reference = out_.spread = Eigen::RowVectorXd::Zero(b_.columns);
+        if (b_.drift == 0 && p.drift.mean.size() > 0) reference = p.drift.mean;
         for (Index c = 0; c < b_.columns; ++c) {
             if (p.drift.polynomial != DriftPolynomial::None) {
                 double mean = 0;
@@ -228,14 +237,15 @@ class LaneWriter {
                     const double gap = std::abs(p.values(i, c) - mean);
                     if (gap < nearest) {
                         nearest = gap;
-                        reference_[c] = p.values(i, c);
+                        reference[c] = p.values(i, c);
                     }
                 }
             }
             double* row = b_.row(b_.valueRow() + c);
             for (Index i = 0; i < n; ++i) {
                 if (!ordinary(p.values(i, c))) return false;
-                at(row, i) = p.values(i, c) - reference_[c];
+                at(row, i) = p.values(i, c) - reference[c];
+                out_.spread[c] = std::max(out_.spread[c], std::abs(p.values(i, c) - reference[c]));
             }
             for (Index i = n; i < b_.n; ++i) at(row, i) = 0;
         }
@@ -246,12 +256,13 @@ class LaneWriter {
     Index lane_;
     double sill_ = 0, unit_ = 1;
     VectorXd origin_;
-    Eigen::RowVectorXd reference_;
+    Lane out_;
 };
 
 /// The answer of one lane, or nothing if it needs the general solver.
-bool readLane(const Batch& b, Index lane, const KrigingProblem& problem, const Eigen::RowVectorXd& reference,
+bool readLane(const Batch& b, Index lane, const KrigingProblem& problem, const LaneWriter::Lane& written,
               KrigingBatchAnswer& answer) {
+    const Eigen::RowVectorXd& reference = written.reference;
     const auto at = [&](const std::vector<double>& array, Index entry) {
         return array[static_cast<std::size_t>(entry * b.lanes + lane)];
     };
@@ -263,13 +274,28 @@ bool readLane(const Batch& b, Index lane, const KrigingProblem& problem, const E
     KrigingPrediction& p = answer.prediction;
     p.estimate.resize(b.targets, b.columns);
     p.variance.resize(b.targets);
+    p.estimateError.resize(b.targets, b.columns);
+    p.varianceError.resize(b.targets);
     p.status.assign(static_cast<std::size_t>(b.targets), TargetStatus::Ok);
+    const LaneBounds bounds(b, lane, problem, written.placeError, lowest);
+    const double tolerance = problem.accuracy.tolerance;
     for (Index t = 0; t < b.targets; ++t) {
         const double variance = at(b.variance, t) + problem.model.nugget;
         p.lowestVariance = std::min(p.lowestVariance, variance);
         p.variance[t] = std::max(0.0, variance);
-        for (Index c = 0; c < b.columns; ++c)
-            p.estimate(t, c) = reference[c] + at(b.estimate, t * b.columns + c);
+        const double weights = bounds.weights(variance);
+        p.varianceError[t] = bounds.variance(weights) + 2 * kEpsilon * p.variance[t];
+        const double scale = std::max({p.variance[t], bounds.smallestVariance(), problem.model.sill()});
+        if (!(p.varianceError[t] <= (tolerance + 4 * kEpsilon) * scale)) return false;
+        for (Index c = 0; c < b.columns; ++c) {
+            const double difference = at(b.estimate, t * b.columns + c);
+            p.estimate(t, c) = reference[c] + difference;
+            const double size = std::max(std::abs(p.estimate(t, c)), std::abs(reference[c]));
+            p.estimateError(t, c) = bounds.estimate(c, weights) + 2 * kEpsilon * size;
+            if (!(p.estimateError(t, c) <=
+                  tolerance * std::max(written.spread[c], std::abs(difference)) + 4 * kEpsilon * size))
+                return false;
+        }
     }
     return p.estimate.allFinite() && p.variance.allFinite();
 }
@@ -297,13 +323,13 @@ void solveGroup(const Shape& shape, const std::vector<std::size_t>& members, Ind
     std::size_t next = 0;
     while (next < members.size()) {
         std::vector<std::size_t> inLane;
-        std::vector<Eigen::RowVectorXd> references;
+        std::vector<LaneWriter::Lane> written;
         while (next < members.size() && static_cast<Index>(inLane.size()) < lanes) {
             const std::size_t i = members[next++];
             LaneWriter writer(batch, static_cast<Index>(inLane.size()));
             if (writer.write(problems[i], targets[i])) {
                 inLane.push_back(i);
-                references.push_back(writer.reference());
+                written.push_back(writer.lane());
             } else {
                 answers[i] = general(problems[i], targets[i]);
             }
@@ -315,7 +341,7 @@ void solveGroup(const Shape& shape, const std::vector<std::size_t>& members, Ind
         kernels::solveBatch(batch);
         for (std::size_t lane = 0; lane < inLane.size(); ++lane) {
             const std::size_t i = inLane[lane];
-            if (!readLane(batch, static_cast<Index>(lane), problems[i], references[lane], answers[i]))
+            if (!readLane(batch, static_cast<Index>(lane), problems[i], written[lane], answers[i]))
                 answers[i] = general(problems[i], targets[i]);
         }
     }

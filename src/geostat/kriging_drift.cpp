@@ -8,18 +8,28 @@
 namespace vlx {
 
 DriftEstimate KrigingSystem::drift() const {
-    if (!report_.ok()) return {};
-    DriftEstimate out = report_.generalisedCovariance ? generalisedDrift() : system_.drift();
-    const Index p = out.coefficients.rows();
+    const Index p = std::max(Index{0}, driftColumns());
+    DriftEstimate out;
+    if (!report_.ok()) {
+        out.coefficients = out.coefficientError = MatrixXd::Constant(p, problem_.values.cols(), kNaN);
+        out.covariance = MatrixXd::Constant(p, p, kNaN);
+        out.varianceError = VectorXd::Constant(p, kNaN);
+        out.accurate = false;
+        return out;
+    }
+    out = report_.generalisedCovariance ? generalisedDrift() : system_.drift();
     // The polynomial columns are in scaled coordinates.
     VectorXd unit = VectorXd::Ones(p);
-    if (drift_.polynomial >= DriftPolynomial::Linear)
-        unit.segment(1, drift_.axes).setConstant(coordinateScale_);
-    if (drift_.polynomial == DriftPolynomial::Quadratic)
-        unit.segment(1 + drift_.axes, drift_.axes * (drift_.axes + 1) / 2)
+    if (problem_.drift.polynomial >= DriftPolynomial::Linear)
+        unit.segment(1, problem_.drift.axes).setConstant(coordinateScale_);
+    if (problem_.drift.polynomial == DriftPolynomial::Quadratic)
+        unit.segment(1 + problem_.drift.axes, problem_.drift.axes * (problem_.drift.axes + 1) / 2)
             .setConstant(coordinateScale_ * coordinateScale_);
     out.coefficients = unit.asDiagonal() * out.coefficients;
     out.covariance = unit.asDiagonal() * out.covariance * unit.asDiagonal() / varianceScale_;
+    out.coefficientError = unit.asDiagonal() * out.coefficientError;
+    out.varianceError = unit.cwiseAbs2().asDiagonal() * out.varianceError / varianceScale_;
+    estimateDriftPrecisely(out);
     return out;
 }
 
@@ -28,15 +38,19 @@ DriftEstimate KrigingSystem::drift() const {
 DriftEstimate KrigingSystem::generalisedDrift() const {
     const Index n = errors_.size(), constant = constantColumn();
     CovarianceTargets targets;
-    const Index p = driftRows(MatrixXd(0, dimension_), MatrixXd(0, external_.cols())).cols();
+    const Index p = driftColumns();
     targets.drift = MatrixXd::Identity(p, p);
     targets.variance = VectorXd::Zero(p);
     targets.covariance = MatrixXd::Zero(n, p);
     VectorXd sum = VectorXd::Zero(p);
-    sum[constant] = drift_.polynomial == DriftPolynomial::None ? 1 / external_(0, constant) : 1;
+    sum[constant] = problem_.drift.polynomial == DriftPolynomial::None ? 1 / external_(0, constant) : 1;
     targets.covariance.col(constant) = level_ + sum[constant] * centreGamma_.array();
     const KrigingPrediction prediction = system_.predict(targets, {.weights = true});
-    DriftEstimate out{prediction.estimate, {}};
+    DriftEstimate out;
+    out.coefficients = prediction.estimate;
+    out.coefficientError = prediction.estimateError;
+    for (const TargetStatus status : prediction.status)
+        out.accurate = out.accurate && status != TargetStatus::Inaccurate;
     MatrixXd gamma(n, n);
     for (Index j = 0; j < n; ++j)
         for (Index i = 0; i < n; ++i) {
@@ -47,31 +61,52 @@ DriftEstimate KrigingSystem::generalisedDrift() const {
     out.covariance = -prediction.weights * gamma * prediction.weights.transpose();
     const double sill = model_.bounded() ? structureSill_ : kInfinity;
     out.covariance(constant, constant) += sill * sum[constant] * sum[constant];
-    if (!model_.bounded()) out.coefficients.row(constant).setConstant(kNaN);
+    // Rounding, and the weights' error, which the bound for the generalised variance has.
+    const RowVectorXd size = prediction.weights.cwiseAbs().rowwise().sum().transpose();
+    const double largest = gamma.size() > 0 ? gamma.cwiseAbs().maxCoeff() : 0;
+    out.varianceError = prediction.varianceError;
+    for (Index j = 0; j < p; ++j) {
+        out.varianceError[j] += system_.entryNoise() * largest * size[j] * size[j];
+        if (j == constant && !model_.bounded()) continue;
+        out.accurate =
+            out.accurate && out.varianceError[j] <=
+                                problem_.accuracy.tolerance * std::max(out.covariance(j, j), structureSill_);
+    }
+    if (!model_.bounded()) {
+        out.coefficients.row(constant).setConstant(kNaN);
+        out.coefficientError.row(constant).setConstant(kNaN);
+        out.varianceError[constant] = kNaN;
+    }
     return out;
 }
 
 LeaveOneOut KrigingSystem::leaveOneOut() const {
-    const auto n = static_cast<Index>(row_.size());
-    const LeaveOneOut merged = system_.leaveOneOut();
+    const auto n = problem_.values.rows();
+    LeaveOneOut merged = system_.leaveOneOut();
     LeaveOneOut out;
-    out.estimate = MatrixXd::Constant(n, dataValues_.cols(), kNaN);
+    out.estimate = MatrixXd::Constant(n, problem_.values.cols(), kNaN);
     out.variance = VectorXd::Constant(n, kNaN);
     out.status.assign(static_cast<std::size_t>(n), TargetStatus::NotEstimable);
+    out.estimateError = out.estimate;
+    out.varianceError = out.variance;
     if (!report_.ok()) return out;
-    const RowVectorXd mean = driftRows(MatrixXd(0, dimension_), MatrixXd(0, external_.cols())).cols() == 0 &&
-                                     drift_.mean.size() > 0
-                                 ? drift_.mean
-                                 : RowVectorXd(RowVectorXd::Zero(dataValues_.cols()));
+    leaveOneOutPrecisely(merged);
+    out.digits = merged.digits;
+    const RowVectorXd mean = driftColumns() == 0 && problem_.drift.mean.size() > 0
+                                 ? problem_.drift.mean
+                                 : RowVectorXd(RowVectorXd::Zero(problem_.values.cols()));
     for (Index i = 0; i < n; ++i) {
         const auto at = static_cast<std::size_t>(i);
         const Index r = row_[at];
         if (r < 0) {  // ignored: every other datum predicts it
             KrigingTargets target;
-            target.points = dataPositions_.row(i);
-            target.externalDrift = dataExternal_.row(i);
+            target.points = problem_.positions.row(i);
+            target.externalDrift = problem_.drift.external.row(i);
             const KrigingPrediction prediction = predict(target);
             out.estimate.row(i) = prediction.estimate.row(0);
+            out.estimateError.row(i) = prediction.estimateError.row(0);
+            out.varianceError[i] = 0;
+            out.digits = std::max(out.digits, prediction.digits);
             out.status[at] = prediction.status[0];
             out.variance[i] = kInfinity;
             continue;
@@ -82,17 +117,18 @@ LeaveOneOut KrigingSystem::leaveOneOut() const {
         for (std::size_t j = 0; j < row_.size(); ++j) {
             if (row_[j] != r || j == at) continue;
             const auto other = static_cast<Index>(j);
-            const double v = dataErrors_[other] * varianceScale_;
+            const double v = problem_.errorVariances[other] * varianceScale_;
             if (v == 0) {
                 exact += 1;
-                average += dataValues_.row(other);
+                average += problem_.values.row(other);
             } else {
                 precision += 1 / v;
-                weighted += dataValues_.row(other) / v;
+                weighted += problem_.values.row(other) / v;
             }
         }
-        const double error = dataErrors_[i] * varianceScale_;
-        const bool estimable = merged.status[static_cast<std::size_t>(r)] == TargetStatus::Ok;
+        const double error = problem_.errorVariances[i] * varianceScale_;
+        const TargetStatus status = merged.status[static_cast<std::size_t>(r)];
+        const bool estimable = status != TargetStatus::NotEstimable;
         double variance = 0;  // of the field here, from all others
         if (exact > 0) {
             out.estimate.row(i) = average / exact;
@@ -107,8 +143,15 @@ LeaveOneOut KrigingSystem::leaveOneOut() const {
             out.estimate.row(i) = prediction + gain * (weighted - precision * prediction);
             variance = precision == 0 ? merged.variance[r] - error : gain;
         }
-        out.status[at] = TargetStatus::Ok;
+        // Twins only shrink the share that the others' prediction has.
+        const bool alone = exact > 0 || !estimable;
+        out.status[at] = alone ? TargetStatus::Ok : status;
         out.variance[i] = (variance + error) / varianceScale_;
+        out.varianceError[i] = (alone ? 0 : merged.varianceError[r]) / varianceScale_;
+        if (alone)
+            out.estimateError.row(i) = 4 * kEpsilon * out.estimate.row(i).cwiseAbs();
+        else
+            out.estimateError.row(i) = merged.estimateError.row(r);
     }
     return out;
 }

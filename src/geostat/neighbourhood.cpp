@@ -89,6 +89,8 @@ NeighbourhoodPrediction predictLocally(const KrigingProblem& problem, const Krig
     KrigingPrediction& prediction = out.prediction;
     prediction.estimate = MatrixXd::Constant(m, columns, nan);
     prediction.variance = VectorXd::Constant(m, nan);
+    prediction.estimateError = prediction.estimate;
+    prediction.varianceError = prediction.variance;
     prediction.status.assign(static_cast<std::size_t>(m), TargetStatus::InvalidTarget);
     const auto fail = [&](std::string message) {
         out.report.status = KrigingStatus::InvalidInput;
@@ -147,6 +149,10 @@ NeighbourhoodPrediction predictLocally(const KrigingProblem& problem, const Krig
         const KrigingPrediction p = system->predict(one);
         prediction.estimate.row(t) = p.estimate.row(0);
         prediction.variance[t] = p.variance[0];
+        prediction.estimateError.row(t) = p.estimateError.row(0);
+        prediction.varianceError[t] = p.varianceError[0];
+        prediction.moreDigits += p.moreDigits;
+        prediction.digits = std::max(prediction.digits, p.digits);
         prediction.status[static_cast<std::size_t>(t)] = p.status[0];
         prediction.lowestVariance = std::min(prediction.lowestVariance, p.lowestVariance);
     }

@@ -4,8 +4,8 @@
 //   float         the same with a float factor and refinement
 //   batched       krigeBatch, a thousand systems at a time
 //   pivoted LU    the bordered matrix of the textbook, by Eigen's full-pivot LU
-// Prints two tables for the README. All columns are measured in turns in one run; times are the fastest of
-// many.
+// and what more digits cost where double precision has lost too many. Prints tables for the README. All
+// columns are measured in turns in one run; times are the fastest of many.
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -175,6 +175,7 @@ void errorTable() {
             for (Index i = 0; i < 40; ++i)
                 p.values.row(i).setConstant(std::sin(3 * p.positions(i, 0)) +
                                             std::cos(2 * p.positions(i, 1)));
+            p.accuracy.mostDigits = 16;  // what double precision alone does
             const Eigen::Vector2d wanted = exact(p, targets);
             const MatrixXd matrix = covarianceMatrix(p);
             // The field's own covariance has eigenvalues down to 1e-20: the error variance is the smallest.
@@ -196,11 +197,37 @@ void errorTable() {
     }
 }
 
+/// Time of a system that is solved with more digits, against double precision alone.
+void moreDigitsTable(const char* title, const VariogramModel& model, double error, double tolerance) {
+    std::printf("\n%s: milliseconds a system\n", title);
+    std::printf("%5s %10s %14s %8s %8s\n", "n", "double", "more digits", "ratio", "digits");
+    std::mt19937_64 engine(3);
+    const KrigingTargets targets = makeTargets();
+    for (const Index n : {16, 64, 256}) {
+        KrigingProblem p = makeProblem(n, engine, model, error);
+        p.accuracy.tolerance = tolerance;
+        KrigingProblem plain = p;
+        plain.accuracy.mostDigits = 16;
+        Timer precise, alone;
+        int digits = 0;
+        for (int round = 0; round < 3; ++round) {
+            precise.round([&] { digits = KrigingSystem(p).predict(targets).digits; }, n > 64 ? 1 : 3);
+            alone.round([&] { sink += KrigingSystem(plain).predict(targets).estimate(0, 0); }, 20);
+        }
+        std::printf("%5ld %10.4f %14.3f %8.0f %8d\n", static_cast<long>(n), alone.best() * 1e3,
+                    precise.best() * 1e3, precise.best() / alone.best(), digits);
+    }
+}
+
 }  // namespace
 
 int main() {
     timeTable("Exponential model", {0.02, {{StructureType::Exponential, 1, 0.3, 1}}});
     timeTable("Stable model, alpha 1.5", {0.02, {{StructureType::Stable, 1, 0.3, 1.5}}});
     errorTable();
+    moreDigitsTable("Exponential model, a tolerance that double precision cannot meet",
+                    {0.02, {{StructureType::Exponential, 1, 0.3, 1}}}, 0.05, 0);
+    moreDigitsTable("Gaussian model, range 1, errors 1e-12", {0, {{StructureType::Gaussian, 1, 1, 1}}}, 1e-12,
+                    KrigingAccuracy{}.tolerance);
     return std::isfinite(sink) ? 0 : 1;
 }

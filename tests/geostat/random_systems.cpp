@@ -1,7 +1,7 @@
-// random_systems [COUNT [SEED]]: COUNT random kriging systems (default 2000) of 16 to 256 data with condition
-// numbers up to 1e16 and beyond: nothing may crash, be non-finite, or have a negative variance. Each is
-// solved in double and in single precision. Prints how often each fallback was taken; exit 1 if anything was
-// wrong.
+// random_systems [COUNT [SEED [DIGITS]]]: COUNT random kriging systems (default 2000) of 16 to 256 data with
+// condition numbers up to 1e16 and beyond: nothing may crash, be non-finite, or have a negative variance.
+// Each is solved in double and in single precision, with up to DIGITS decimal digits (default 400; 16: none
+// but double's). Prints how often each fallback was taken; exit 1 if anything was wrong.
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -35,7 +35,7 @@ std::string fault(const KrigingReport& report, const KrigingPrediction& p) {
 }
 
 void count(Counts& counts, const KrigingReport& report, const KrigingPrediction& p) {
-    const auto note = [&](const char* name, bool taken) { counts.fallbacks[name] += taken ? 1 : 0; };
+    const auto note = [&](const std::string& name, bool taken) { counts.fallbacks[name] += taken ? 1 : 0; };
     note("coincident data merged", report.merged > 0);
     note("generalised covariance", report.generalisedCovariance);
     note("jitter", report.jitter > 0);
@@ -45,6 +45,11 @@ void count(Counts& counts, const KrigingReport& report, const KrigingPrediction&
     bool notEstimable = false;
     for (const TargetStatus s : p.status) notEstimable |= s == TargetStatus::NotEstimable;
     note("a target's drift not estimable", notEstimable);
+    note("more digits", p.moreDigits > 0);
+    note("more digits: " + std::to_string(p.digits), p.moreDigits > 0);
+    bool inaccurate = false;
+    for (const TargetStatus s : p.status) inaccurate |= s == TargetStatus::Inaccurate;
+    note("a target flagged inaccurate", inaccurate);
     note("a variance clamped at 0", p.lowestVariance < 0);
     const double power = std::floor(std::log10(std::max(1.0, report.conditionEstimate)));
     ++counts.condition[static_cast<std::size_t>(std::min(19.0, power))];
@@ -55,8 +60,9 @@ void count(Counts& counts, const KrigingReport& report, const KrigingPrediction&
 int main(int argc, char** argv) {
     const long systems = argc > 1 ? std::atol(argv[1]) : 2000;
     const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-    if (argc > 3 || systems < 1) {
-        std::cerr << "usage: random_systems [COUNT [SEED]]\n";
+    const int digits = argc > 3 ? std::atoi(argv[3]) : KrigingAccuracy{}.mostDigits;
+    if (argc > 4 || systems < 1) {
+        std::cerr << "usage: random_systems [COUNT [SEED [DIGITS]]]\n";
         return 2;
     }
     testing::RandomProblemOptions options;
@@ -68,6 +74,7 @@ int main(int argc, char** argv) {
     for (long k = 0; k < systems; ++k) {
         testing::Random random(seed * 1000003 + static_cast<std::uint64_t>(k));
         testing::RandomProblem r = testing::randomProblem(random, options);
+        r.problem.accuracy.mostDigits = digits;
         for (int precision = 0; precision < 2; ++precision) {
             r.problem.precision = precision == 0 ? KrigingPrecision::Double : KrigingPrecision::Single;
             const KrigingSystem system(r.problem);

@@ -30,6 +30,13 @@
 ///      any other is flagged.
 ///   4. Weights from two triangular solves; one step of iterative refinement where the condition number asks
 ///      for it; the variance from the quadratic form above, in which errors of w enter squared.
+///   5. A bound of the error. With the dual weights y, K y + F b = z, F'y = 0, an error dK of the entries or
+///   of
+///      the factorisation changes the estimate by -y'dK w and the variance by w'dK w, and what is left of the
+///      equations, c0 - K w - F m = r and f0 - F'w = s, by y'r + b's: bounds in the 1-norms of y and w, with
+///      |dK_ij| <= (entryError + sqrt(n) eps) sqrt(K_ii K_jj) (Higham 2002, sections 7.1 and 10.1; the root
+///      of n after Higham and Mary 2019). They hold to first order: where eps times the condition number is
+///      not small, or jitter was needed, there is no bound and it is infinite.
 namespace vlx {
 
 enum class KrigingStatus {
@@ -43,6 +50,19 @@ enum class KrigingStatus {
 /// or refinement does not converge, the factor is double and the report says so.
 enum class KrigingPrecision { Double, Single };
 
+/// How good an answer must be, and what that may cost. An error is allowed where it is at most `tolerance`
+/// times the larger of the answer's own size and its scale (of estimates: the largest |value - reference|; of
+/// variances: the field's variance), or a few units of the answer's last place.
+///
+/// Where the bound of the error is larger, KrigingSystem solves the system again with 50, 100, 200, 400
+/// decimal digits, covariances included, until two answers in a row agree. That takes some thousand times as
+/// long (tests/bench/solver_bench.cpp measures it).
+struct KrigingAccuracy {
+    double tolerance = 1e-9;      ///< >= 0
+    int mostDigits = 400;         ///< decimal digits to go to; below 50: double precision only
+    Eigen::Index mostData = 512;  ///< larger systems stay in double precision
+};
+
 /// What building a system found. Anything but zero or false below is a documented fallback, meant to be
 /// counted.
 struct KrigingReport {
@@ -53,9 +73,9 @@ struct KrigingReport {
     Eigen::Index merged = 0;   ///< data that were folded into a coincident one
     Eigen::Index ignored = 0;  ///< data of infinite error variance
     int droppedDrift = 0;      ///< linearly dependent drift columns
-    double jitter = 0;         ///< added to the unit diagonal (relative to each datum's variance)
-    bool indefinite = false;   ///< the jitter needed exceeds rounding: the covariances are not a covariance
-    bool degenerate = false;   ///< some datum has no variance at all (zero sill and zero error)
+    double jitter = 0;  ///< added to the double factor's unit diagonal (relative to each datum's variance)
+    bool indefinite = false;  ///< the jitter needed exceeds rounding: the covariances are not a covariance
+    bool degenerate = false;  ///< some datum has no variance at all (zero sill and zero error)
     bool generalisedCovariance = false;  ///< increments instead of covariances: long ranges, unbounded models
     bool singlePrecision = false;        ///< the factor in use is float
     double conditionEstimate = 0;        ///< of the equilibrated matrix, usually within a factor n
@@ -68,6 +88,7 @@ enum class TargetStatus {
     Exact,          ///< the target is bitwise at an error-free datum: its value, variance 0
     NotEstimable,   ///< its drift is outside what the data determine: the estimate uses the kept columns only
     InvalidTarget,  ///< a coordinate, drift or covariance is not finite: estimate and variance are NaN
+    Inaccurate,     ///< the error may be larger than was asked for: see the bound beside the answer
 };
 
 struct KrigingPrediction {
@@ -76,6 +97,11 @@ struct KrigingPrediction {
     Eigen::MatrixXd weights;           ///< targets x data; empty unless asked for
     std::vector<TargetStatus> status;  ///< of each target
     double lowestVariance = 0;         ///< the most negative variance before clamping at 0: rounding, <= 0
+
+    Eigen::MatrixXd estimateError;  ///< bound of each estimate's error, infinite if there is none
+    Eigen::VectorXd varianceError;  ///< bound of each variance's error, likewise
+    Eigen::Index moreDigits = 0;    ///< targets that were solved with more digits than a double has
+    int digits = 16;                ///< the most decimal digits that any target was solved with
 };
 
 struct PredictOptions {
@@ -84,14 +110,21 @@ struct PredictOptions {
 
 /// Generalised least squares: beta and its covariance matrix.
 struct DriftEstimate {
-    Eigen::MatrixXd coefficients;  ///< drift columns x value columns; 0 for dropped columns
-    Eigen::MatrixXd covariance;    ///< drift columns x drift columns
+    Eigen::MatrixXd coefficients;      ///< drift columns x value columns; 0 for dropped columns
+    Eigen::MatrixXd covariance;        ///< drift columns x drift columns
+    Eigen::MatrixXd coefficientError;  ///< bound of each coefficient's error, infinite if there is none
+    Eigen::VectorXd varianceError;     ///< bound of the error of each variance (covariance's diagonal)
+    bool accurate = true;              ///< all bounds are as small as was asked for
+    int digits = 16;                   ///< decimal digits that it was solved with
 };
 
 struct LeaveOneOut {
     Eigen::MatrixXd estimate;          ///< data x value columns: datum i from all others
     Eigen::VectorXd variance;          ///< of the residual z_i - estimate_i (the datum's own error included)
     std::vector<TargetStatus> status;  ///< NotEstimable: the others do not determine the drift there (NaN)
+    Eigen::MatrixXd estimateError;     ///< bound of each estimate's error, infinite if there is none
+    Eigen::VectorXd varianceError;     ///< bound of each variance's error, likewise
+    int digits = 16;                   ///< decimal digits that it was solved with
 };
 
 struct CovarianceProblem {
@@ -99,6 +132,9 @@ struct CovarianceProblem {
     Eigen::MatrixXd drift;       ///< F, n x p; p = 0 for simple kriging
     Eigen::MatrixXd values;      ///< z, n x c: one factorisation serves all columns
     KrigingPrecision precision = KrigingPrecision::Double;
+    /// Error of K_ij relative to sqrt(K_ii K_jj): by default each entry has been rounded once.
+    double entryError = 0x1p-53;
+    double tolerance = KrigingAccuracy{}.tolerance;  ///< a target with a larger bound of error is Inaccurate
 };
 
 /// The targets of CovarianceSystem::predict, one a column of `covariance`.
@@ -108,6 +144,8 @@ struct CovarianceTargets {
     Eigen::VectorXd variance;    ///< C00, m
     /// Empty, or for each target the datum whose value it is by definition (same place, no error), or -1.
     std::vector<Eigen::Index> exactDatum;
+    /// Empty, or for each target the absolute error of its c0 and C00; empty: each has been rounded once.
+    Eigen::VectorXd entryError;
 };
 
 /// A factorised kriging system. Building costs n^3 / 3 flops, a target 2 n^2 to 6 n^2. Immutable; safe to
@@ -133,6 +171,17 @@ class CovarianceSystem {
     ///     Q = K^-1 - K^-1 F (F'K^-1 F)^-1 F'K^-1.
     LeaveOneOut leaveOneOut() const;
 
+    /// Columns of F that are linearly independent, in order of elimination.
+    const std::vector<Eigen::Index>& independentDrift() const { return kept_; }
+
+    /// The error that `tolerance` allows for an estimate of a value column, or for a variance of a field of
+    /// variance `scale`.
+    double allowedEstimateError(Eigen::Index column, double estimate) const;
+    double allowedVarianceError(double variance, double scale) const;
+
+    /// Error of K_ij relative to sqrt(K_ii K_jj), the factorisation's included: entryError + sqrt(n) eps.
+    double entryNoise() const;
+
   private:
     /// Targets' drift in the factorised basis, and whether it can be estimated.
     struct TargetDrift {
@@ -145,7 +194,18 @@ class CovarianceSystem {
     struct Solution {
         Eigen::MatrixXd weights, multipliers;
         Eigen::RowVectorXd explained;
-        bool converged = true;
+        double change = 0;  // the last refinement's, relative to the weights
+    };
+
+    /// Bounds of errors, in equilibrated units.
+    struct Bounds {
+        Eigen::MatrixXd estimate;     // value columns x m
+        Eigen::RowVectorXd variance;  // m
+    };
+    /// Right-hand sides, one a column: equilibrated c0, internal drift, C00, and the entries' absolute error.
+    struct Right {
+        Eigen::MatrixXd covariance, drift;
+        Eigen::RowVectorXd variance, entryError;
     };
 
     bool validate(const CovarianceProblem& problem);
@@ -154,9 +214,18 @@ class CovarianceSystem {
     bool factoriseSingle();
     void factoriseDouble();
     bool decomposeDrift();
+    bool orthogonaliseDrift();
+    Eigen::MatrixXd carriedRows(Eigen::Index first, Eigen::Index count) const;
     void centreValues();
     void describe();
     bool careful() const;
+    bool boundable() const;
+    double inverseNorm() const;
+    Eigen::RowVectorXd dualNormsAtMost() const;
+    Eigen::RowVectorXd dualNorms() const;
+    Bounds quickBounds(const Solution& solution, const Right& right, const Eigen::RowVectorXd& y) const;
+    Bounds closeBounds(const Solution& solution, const Right& right) const;
+    double smallestVariance() const;
     CovarianceSystem inDouble() const;
     template <class Scalar>
     double factoriseWith(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>& factor, double jitter) const;
@@ -169,9 +238,9 @@ class CovarianceSystem {
     Solution solve(const Eigen::MatrixXd& c0, const Eigen::MatrixXd& f0) const;
 
     KrigingReport report_;
-    Eigen::MatrixXd covariance_;    // D K D, lower half, without jitter
-    Eigen::VectorXd scale_;         // D
-    Eigen::MatrixXd factor_;        // L in its first n rows, lower half; (L^-1 D F)' below
+    Eigen::MatrixXd covariance_;  // D K D, lower half, without jitter
+    Eigen::VectorXd scale_;       // D
+    Eigen::MatrixXd factor_;      // L in its first n rows, lower half; (L^-1 D F)' and (L^-1 values_)' below
     Eigen::MatrixXf factorSingle_;  // the same, if report_.singlePrecision
 
     // Internal drift column j = (F_j - centre_j F_constant) * columnScale_j.
@@ -186,8 +255,11 @@ class CovarianceSystem {
     std::vector<Eigen::Index> kept_, dropped_;  // columns of F
 
     Eigen::MatrixXd rawValues_;
-    Eigen::MatrixXd values_;  // D (z - reference) / valueScale
-    Eigen::RowVectorXd reference_, valueScale_;
+    Eigen::MatrixXd values_;                              // D (z - reference) / valueScale
+    Eigen::RowVectorXd reference_, valueScale_, spread_;  // spread: largest |z - reference|
+    Eigen::RowVectorXd dualNorm_;                         // |(I - Q Q') L^-1 values_| of each column
+
+    double entryError_ = 0, tolerance_ = 0;
 };
 
 }  // namespace vlx

@@ -25,17 +25,22 @@
 /// Limits of the answer are documented conventions, not accidents:
 ///   coincident data          merged by inverse variance (a sufficient statistic); error-free twins are
 ///                            averaged and win over any with errors
-///   infinite error variance  the datum is ignored
+///   infinite error variance  the datum is ignored, whatever its other numbers (NaN too)
 ///   zero sill, zero error    the limit of equal small variances: the drift's least squares fit, variance 0
 ///   unbounded model          generalised covariance (needs a constant in the drift)
 ///   range >> domain          the same, so that no digits are lost in sill - gamma
 ///   dependent drift columns  dropped; targets that need them are flagged NotEstimable
 ///   no data                  known mean: the mean and the sill; otherwise TooFewData
+///   digits lost in double    solved again with more (KrigingAccuracy), counted in the answer; a target that
+///   is
+///                            still not as good as was asked for is flagged Inaccurate, with its error's
+///                            bound
 namespace vlx {
 
 namespace kernels {
 class ModelColumns;
 }
+class PreciseKriging;
 
 /// Polynomial part of the drift. `None` is a known mean (simple kriging) unless external columns are given.
 enum class DriftPolynomial {
@@ -68,6 +73,7 @@ struct KrigingProblem {
     /// identity.
     Eigen::MatrixXd transform;
     KrigingPrecision precision = KrigingPrecision::Double;
+    KrigingAccuracy accuracy;  ///< of estimates, variances, drift and leave-one-out
 };
 
 /// Where to predict: points, or averages of Z over blocks (change of support).
@@ -118,40 +124,52 @@ class KrigingSystem {
 
     const KrigingReport& report() const { return report_; }
 
-    /// Estimates and kriging variances of the targets. Wrong shapes make every target InvalidTarget.
+    /// Estimates and kriging variances of the targets, within the problem's accuracy where their status is
+    /// Ok. Wrong shapes, and a system that is not ok(), make every target InvalidTarget: NaN, in the usual
+    /// shapes.
     KrigingPrediction predict(const KrigingTargets& targets, const KrigingPredictOptions& options = {}) const;
 
     /// Coefficients of the drift (kriging of the mean) with their covariance, in the order polynomial,
     /// external. The polynomial is in x - driftOrigin(): raw powers of coordinates far from the origin would
-    /// lose all digits. A constant drift's only coefficient is the GLS mean.
+    /// lose all digits. A constant drift's only coefficient is the GLS mean. NaN if the system is not ok().
     DriftEstimate drift() const;
     const Eigen::VectorXd& driftOrigin() const { return origin_; }
 
-    /// Every datum from all others; coincident data are left out one at a time.
+    /// Every datum from all others; coincident data are left out one at a time. NaN if the system is not
+    /// ok().
     LeaveOneOut leaveOneOut() const;
 
   private:
     struct Block;
-    bool validate(const KrigingProblem& problem);
-    void chooseScales(const KrigingProblem& problem);
+    bool validate();
+    void chooseScales();
+    bool ignored(Eigen::Index datum) const;
     std::vector<std::pair<double, Eigen::Index>> sortedSums() const;
     void merge();
     void mergeGroups(const std::vector<std::pair<double, Eigen::Index>>& sums);
-    void assemble(KrigingPrecision precision);
+    void assemble();
+    double entryError() const;
     void completeReport();
     Eigen::MatrixXd place(const Eigen::MatrixXd& points) const;
     Eigen::MatrixXd driftRows(const Eigen::MatrixXd& points, const Eigen::MatrixXd& external) const;
+    Eigen::Index driftColumns() const;
     Eigen::Index constantColumn() const;
     DriftEstimate generalisedDrift() const;
     Block block(const KrigingTargets& targets, Eigen::Index target) const;
+    CovarianceTargets lowerTargets(const KrigingTargets& targets, KrigingQuantity quantity) const;
+    bool mayUseMoreDigits() const;
+    void prepareMoreDigits();
+    const PreciseKriging& precise() const;
+    void predictPrecisely(const KrigingTargets& targets, const KrigingPredictOptions& options,
+                          const CovarianceTargets& lower, KrigingPrediction& prediction) const;
+    void estimateDriftPrecisely(DriftEstimate& estimate) const;
+    void leaveOneOutPrecisely(LeaveOneOut& merged) const;
 
+    KrigingProblem problem_;  // as given, with an error variance for each datum
     KrigingReport report_;
     VariogramModel model_;  // ranges in scaled coordinates, sills in scaled variances
     std::shared_ptr<const kernels::ModelColumns> columns_;
     double nugget_ = 0, structureSill_ = 0;
-    DriftModel drift_;
-    Eigen::Index dimension_ = 0;
-    Eigen::MatrixXd transform_;
     Eigen::VectorXd origin_;
     double coordinateScale_ = 1, varianceScale_ = 1;  // powers of two: scaled = original * scale
 
@@ -168,10 +186,14 @@ class KrigingSystem {
     // Data as given: one entry a datum.
     std::vector<Eigen::Index> row_;  // its factorised datum, -1 = ignored
     Eigen::VectorXd share_;          // its share of that datum's weight
-    Eigen::VectorXd dataErrors_;
-    Eigen::MatrixXd dataPositions_, dataExternal_, dataValues_;
 
     CovarianceSystem system_;
+
+    struct Lazy;
+    std::shared_ptr<Lazy> lazy_;  // the system with more digits, once it has been needed
+    /// Where double precision finds drift columns dependent: the drift alone, by least squares, to say
+    /// whether the columns are, or only seem to be through an ill-conditioned covariance.
+    std::shared_ptr<const CovarianceSystem> driftAlone_;
 };
 
 }  // namespace vlx

@@ -12,6 +12,7 @@
 /// Research 19, 1983): the likelihood of those contrasts of the data that the drift does not touch, so that
 /// estimating the drift does not bias the variances. Needs no lag classes and takes each datum's known error
 /// variance exactly; costs O(n^3) an evaluation, so it is the reference for fitVariogram(), or for few data.
+/// Double precision throughout.
 namespace vlx {
 
 /// The data of a likelihood: n positions (n x d), values (n x c; columns are independent realisations with
