@@ -291,8 +291,8 @@ class Pipeline {
         while (krigedRows_ < until) {
             const int y = krigedRows_;
             smooth(y + kTile + kTileMargin);
-            TileInput input{&data_,           &squares_,     &features_,     &variances_, {radiance_},
-                            layout_.features, layout_.group, layout_.groups, width_,      height_};
+            TileInput input{&data_,        &features_,     &variances_, {radiance_}, layout_.features,
+                            layout_.group, layout_.groups, width_,      height_};
             // Rows that this tile row is the first to reach.
             for (RowRing& ring : sums_)
                 for (int row = zeroedRows_; row < std::min(height_, y + kTile + kMaxReach); ++row)

@@ -142,9 +142,6 @@ class Tile {
         y_ = y;
         reach_ = reach;
         const int c = input.planes.radiance;
-        own_.resize(planes(1));
-        freedom_.resize(planes(1));
-        copy(*input.squares, 3, freedom_.data());
         for (int half = 0; half < 2; ++half) {
             means_[half].resize(planes(c));
             counts_[half].resize(planes(1));
@@ -161,13 +158,10 @@ class Tile {
             std::copy_n(means_[half].data(), planes(3), guide.value.data());
             for (int k = 0; k < 3; ++k) {
                 copy(*input.variances, k, guide.variances(k));
-                copy(*input.squares, k, own_.data());
                 for (std::size_t i = 0; i < plane(1); ++i) {
                     const float n = std::max(1.f, counts_[half][i]);
                     errors_[half][i] += guide.variances(k)[i] / (3 * n);
-                    // Its own scatter can raise a pixel's variance, not lower it: an outlier counts as noisy.
-                    const float own = freedom_[i] >= 1 ? own_[i] / freedom_[i] : 0;
-                    guide.variances(k)[i] = std::max(guide.variances(k)[i], own) / n;
+                    guide.variances(k)[i] /= n;
                 }
             }
         }
@@ -484,8 +478,7 @@ class Tile {
     TileInput in_;
     int x_ = 0, y_ = 0, reach_ = 0;
     PatchTile guides_[2];
-    std::vector<float> own_, freedom_, means_[2], counts_[2], errors_[2], distances_[2], references_,
-        features_, scratch_;
+    std::vector<float> means_[2], counts_[2], errors_[2], distances_[2], references_, features_, scratch_;
 
     // Of the centre at work.
     std::vector<int> index_, varying_, used_, group_;

@@ -39,7 +39,6 @@ inline float reference(const RowRing& data, const DataPlanes& planes, int channe
 
 struct TileInput {
     const RowRing* data = nullptr;       ///< DataPlanes
-    const RowRing* squares = nullptr;    ///< kSquaresPlanes
     const RowRing* features = nullptr;   ///< f features, then their f error variances
     const RowRing* variances = nullptr;  ///< 3: variance of one sample of R, G, B
     DataPlanes planes;

@@ -36,14 +36,27 @@
 ///    halves' difference explains (positive-part James-Stein). Models and the pixel's plain mean are combined
 ///    per pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse,
 ///    fitted over about 20 x 20 pixels; the plain mean enters only where it improves by two standard errors.
-/// 6. *Error map*: by the law of total variance. The spread of the neighbourhoods' predictions about their
-///    mean, halved since two halves are averaged, and the spread of the models about the combination.
+/// 6. *Error map*: the estimator's own variance. The noise of the halves' common data is estimated twice, and
+///    half of each taken: by what the halves' combinations differ in, (A - B)^2 / 4 over 5 x 5 pixels of
+///    alike features; and by the kriging variance of the neighbourhoods, v (1 + p) / sum w (p effective
+///    functions), less what they spread about their mean, which averaging takes off. That spread is added, as
+///    what the drift does not say, and so is what a model differs from the combination by beyond its own
+///    variance.
+/// 7. *What samples do not say*: no pixel is exact but where the dump states an error variance of 0, there
+/// and
+///    at all pixels that it was pooled over. Where not two of the n samples around a pixel differ, what they
+///    did not see has a probability of up to 3 / n (95 % confidence): the variance of a sample is 3 / n times
+///    the square of the pixel's level or the picture's mean. A pixel without samples, or without those of a
+///    half, is no datum: it is predicted by the neighbourhoods that reach it, else (more than 5 pixels from
+///    any sample) read off means of blocks of 8 x 8 pixels, interpolated; its error grows by the semivariance
+///    of the picture at the distance of the nearest samples, towards the field's own spread. Of features,
+///    what exceeds their scale counts by its logarithm, and in a neighbourhood the few values that lie
+///    farther from the range of all others than it is wide count as not known.
 ///
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
 /// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights
 /// too, so that dividing by it leaves no halos; it is kept within 0 to 1.
 ///
-/// A pixel whose samples all agree in radiance and in every feature (of at least 2) is exact and stays.
 namespace vlx {
 
 /// What is given up for speed: models used, and how densely neighbourhoods overlap.
@@ -56,9 +69,10 @@ enum class Quality {
 /// What happens to samples that are brighter than all else around (fireflies).
 enum class Fireflies {
     Keep,    ///< nothing: unbiased, and noisy
-    Robust,  ///< the brightest sample of the 5 x 5 pixels around it counts as bright as the second brightest
-             ///< (a Winsorised mean: of 25 n samples one, so the bias vanishes as n grows)
-    Clamp,   ///< samples above a given luminance are scaled down to it: a bias that stays
+    Robust,  ///< the brightest sample of the 5 x 5 pixels of the dump around it, if there are 9 or more,
+             ///< counts as bright as the second brightest (a Winsorised mean: of 25 n samples one, so the
+             ///< bias vanishes as n grows)
+    Clamp,  ///< samples above a given luminance are scaled down to it: a bias that stays
 };
 
 struct DriftKrigingOptions {
@@ -95,7 +109,7 @@ Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& o
 /// Reads the dump once, in bands; memory depends on its width, not its height. Bit-identical for any number
 /// of threads. Every channel gets the same weights: parts that add up to R, G, B still do. Channels of the
 /// image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without samples is
-/// predicted from its neighbours and counted; a sample with radiance that is not finite counts as left out.
+/// predicted and counted; a sample with radiance that is not finite counts as left out.
 /// Throws as SampleSource::read; Error when options are invalid, name channels that the dump lacks, ask for a
 /// scale where it has no positions or for more bands than rows, and when maxMemory is too little, saying what
 /// would do.
