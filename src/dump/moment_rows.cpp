@@ -74,12 +74,12 @@ MomentRows::Triple MomentRows::variance(std::size_t pixel, Doubts& doubts) const
         if (channels_.meaning == VarianceMeaning::OfSample) v = n >= 1 ? v / n : NAN;
         if (channels_.meaning == VarianceMeaning::SecondMoment)
             v = n >= 2 ? (v - first[c] * first[c]) / (n - 1) : NAN;
-        if (!std::isfinite(v)) {
+        if (v < 0) ++doubts.negative;
+        if (!(v >= 0) || !std::isfinite(v)) {  // no variance of anything
             ++doubts.unknown;
             return {kUnknown, kUnknown, kUnknown};
         }
-        if (v < 0) ++doubts.negative;
-        result[c] = std::max(v, 0.0);
+        result[c] = v;
     }
     if (!channels_.xyz) return result;
     Triple rgb{};
@@ -153,7 +153,8 @@ ImportReport MomentRows::report() const {
             "Variances of X, Y, Z became those of R, G, B (Rec. 709) as if their errors were perfectly "
             "correlated.");
     if (doubts.negative > 0)
-        notes.push_back(std::to_string(doubts.negative) + " negative variances count as 0.");
+        notes.push_back(std::to_string(doubts.negative) +
+                        " variances are negative: they count as not known.");
     if (doubts.unknown > 0)
         notes.push_back(std::to_string(doubts.unknown) +
                         " pixels have no usable variance: they are one sample of unknown variance (-1).");

@@ -132,12 +132,15 @@ std::string_view name(RegionOutcome outcome) {
     return "";
 }
 
+constexpr double kMuchLight = 0.1;
+
 std::string toText(const ReconstructionReport& report) {
     std::ostringstream text;
     text << report.samples << " samples";
     if (report.droppedSamples > 0) text << ", " << report.droppedSamples << " dropped (non-finite)";
     if (report.emptyPixels > 0) text << ", " << report.emptyPixels << " pixels without samples";
     if (report.farPixels > 0) text << " (" << report.farPixels << " of them more than 5 pixels from any)";
+    if (report.exactPixels > 0) text << ", " << report.exactPixels << " pixels kept: their stated error is 0";
     text << "\n";
     bool first = true;
     for (int i = 0; i < kRegionOutcomes; ++i) {
@@ -149,7 +152,10 @@ std::string toText(const ReconstructionReport& report) {
     if (!first) text << "\n";
     if (report.limitedSamples > 0 || report.neighbourhoods > 0)
         text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
-             << " % of the light removed\n";
+             << " % of the light removed"
+             << (report.energyRemoved > kMuchLight ? " (WARNING: much; where few samples find the light, "
+                                                     "--fireflies keep keeps it)\n"
+                                                   : "\n");
     if (report.neighbourhoods > 0)
         text << report.neighbourhoods << " neighbourhoods kriged, "
              << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
