@@ -177,7 +177,6 @@ float PixelData::secondBrightest(int x, int y) const {
 /// A pixel of one sample has no variance of its own: half the mean squared difference from its four
 /// neighbours stands in, with so little weight that it counts only where no pixel around has better.
 void PixelData::borrowSquares(int x, int y, float* squares, float& freedom) const {
-    constexpr float kFreedom = 1e-3f;
     float sum[3] = {};
     int pairs = 0;
     const auto mean = [&](int c, int col, int row) {
@@ -194,8 +193,8 @@ void PixelData::borrowSquares(int x, int y, float* squares, float& freedom) cons
         }
     }
     if (pairs == 0) return;
-    for (int c = 0; c < 3; ++c) squares[c] = kFreedom * sum[c] / static_cast<float>(pairs);
-    freedom = kFreedom;
+    for (int c = 0; c < 3; ++c) squares[c] = kBorrowedFreedom * sum[c] / static_cast<float>(pairs);
+    freedom = kBorrowedFreedom;
 }
 
 }  // namespace vlx

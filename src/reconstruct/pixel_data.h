@@ -29,6 +29,9 @@ struct DataPlanes {
     int halfCount(int half) const { return half == 0 ? countA() : countB(); }
 };
 
+/// Degrees of freedom of a pixel of one sample, whose variance is what its neighbours differ from it by.
+inline constexpr float kBorrowedFreedom = 1e-3f;
+
 /// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples.
 inline constexpr int kSquaresPlanes = 5;
 

@@ -162,6 +162,11 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
                 if (!stated && variance <= kAgreement * kAgreement * level * level)
                     variance = std::max(variance, unseenVariance(static_cast<double>(out[4][i]),
                                                                  std::max(level, picture.level)));
+                else if (!stated && out[3][i] < 1) {  // a few pairs may be alike by chance
+                    constexpr float kPicture = 2 * kBorrowedFreedom;
+                    variance = (static_cast<double>(out[c][i]) + kPicture * picture.variance[c]) /
+                               static_cast<double>(out[3][i] + kPicture);
+                }
             }
             result[i] = static_cast<float>(variance);
         }

@@ -24,8 +24,8 @@ void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, cons
 ///     w = exp(-sum over features of df^2 / (0.1^2 + 2 v)),   v the pixel's own feature error variance.
 /// Where they agree (within the rounding of half floats) and the dump does not state so, unseenVariance() of
 /// their sum w n samples and of the pixel's own mean or the picture's, whichever is larger; where no pixel
-/// has two samples or a neighbour to compare it with, the picture's. Writes planes 0 to 2: above 0 but where
-/// the dump states 0.
+/// has two samples, the picture's counts as two more pixels; where none has a neighbour to compare it with,
+/// it stands alone. Writes planes 0 to 2: above 0 but where the dump states 0.
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
                      const RowRing& features, int featureCount, const PictureScale& picture, int y, int width,
                      int height, RowRing& variances);

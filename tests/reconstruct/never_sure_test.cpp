@@ -244,6 +244,10 @@ TEST(NeverSure, SubPixelsWithoutSamplesAreNotBlack) {
         const Image image = reconstructDriftKriging(dump, {.scale = scale}).image;
         EXPECT_GT(least(image, "A"), 0.98) << spp << " " << scale;
         EXPECT_GT(least(image, "G"), 0.49) << spp << " " << scale;
+        for (int y = 0; y < image.data.height; ++y)
+            for (int x = 0; x < image.data.width; ++x)
+                EXPECT_NEAR(image.at(x, y)[0], 0.5, 4.5f * deviation(image, x, y))
+                    << spp << " at " << x << " " << y;
     }
 }
 
