@@ -61,9 +61,7 @@ Reconstruction reconstructMean(const SampleSource& dump, const Progress& progres
                                         : borrowedVariance(band, channels.layout, column, row);
                 for (int c = 0; c < radiance; ++c) out[c] = static_cast<float>(pixel.means(0, c));
                 for (int c = 0; c < 3; ++c)
-                    out[radiance + c] = static_cast<float>(
-                        variance[c] > 0 ? std::sqrt(variance[c] / pixel.counts[0])
-                                        : picture.agreedDeviation(pixel.means(0, c), pixel.counts[0]));
+                    out[radiance + c] = static_cast<float>(std::sqrt(variance[c] / pixel.counts[0]));
             }
         });
     });

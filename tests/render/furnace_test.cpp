@@ -15,12 +15,13 @@ constexpr int kSide = 24;  // pixels
 #ifdef VARIOLUX_SANITIZED
 constexpr int kBlocks = 8, kSamples = 2;
 constexpr double kMeanError = 0.05;
+constexpr double kSigmas = 20;  // beside kPixelError; errors of 8 blocks of 2 samples have long tails
 #else
 constexpr int kBlocks = 8, kSamples = 16;  // samples in each block
 constexpr double kMeanError = 0.01;
+constexpr double kSigmas = 6;  // beside kPixelError; the seeds are fixed
 #endif
 constexpr double kPixelError = 0.1;  // noise apart
-constexpr double kSigmas = 6;        // beside that; the seeds are fixed
 
 /// Mean and standard error, from blocks of samples, of the pixels that the object covers altogether.
 struct Pixel {
