@@ -132,7 +132,8 @@ TEST(ToolLog, JsonLinesOnStandardErrorAndOpenJdOnStandardOutput) {
     EXPECT_EQ(end["exitCode"], 1);
     EXPECT_NE(end["message"].get<std::string>().find("no.exr: expected an image"), std::string::npos);
 
-    const ToolRun openjd = pack({"stack", s.folder / "a_0001.exr", "-o", s.out, "--log", "openjd", "--overwrite"});
+    const ToolRun openjd =
+        pack({"stack", s.folder / "a_0001.exr", "-o", s.out, "--log", "openjd", "--overwrite"});
     EXPECT_NE(openjd.out.find("openjd_progress: 100.0\n"), std::string::npos) << openjd.out;
     EXPECT_EQ(openjd.err, "");
 }

@@ -69,8 +69,8 @@ struct MomentOptions {
 /// would have. Without `halves` a pixel is the one sample m with variance v.
 ///
 /// A variance that is not finite, negative (rounding of second moments: all samples agreed), or of fewer
-/// samples than it takes, is not known: then the pixel is one sample m with variance -1; a pixel whose mean is
-/// not finite is one sample. Variances of X, Y, Z become those of R, G, B (Rec. 709) as if the errors of
+/// samples than it takes, is not known: then the pixel is one sample m with variance -1; a pixel whose mean
+/// is not finite is one sample. Variances of X, Y, Z become those of R, G, B (Rec. 709) as if the errors of
 /// X, Y, Z were perfectly correlated, which holds for noise of one hue. Works by bands of rows. Throws Error
 /// when images cannot be read or have different windows, when R, G, B or a variance cannot be found, when the
 /// number of samples is needed and not known, and as DumpWriter. The preset Plain finds the layers of

@@ -72,7 +72,7 @@ enum class Fireflies {
     Robust,  ///< the brightest sample of the 5 x 5 pixels of the dump around it, if there are 9 or more,
              ///< counts as bright as the second brightest (a Winsorised mean: of 25 n samples one, so the
              ///< bias vanishes as n grows)
-    Clamp,  ///< samples above a given luminance are scaled down to it: a bias that stays
+    Clamp,   ///< samples above a given luminance are scaled down to it: a bias that stays
 };
 
 struct DriftKrigingOptions {
