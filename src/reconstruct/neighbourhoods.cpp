@@ -397,10 +397,14 @@ class Tile {
         scatter(predicted_.data(), n, sums_.data() + plane(out.weight()));
         // Kriging variance, on average over the data: the constant and each effective function cost one part
         // in as many as there are.
-        const auto krigingVariance = static_cast<float>(variance * (1 + drift.effective) / total);
-        for (int i = 0; i < n; ++i)
-            sums_[plane(out.variance()) + static_cast<std::size_t>(index_[static_cast<std::size_t>(i)])] +=
-                predicted_[static_cast<std::size_t>(i)] * krigingVariance;
+        const auto part = static_cast<float>((1 + drift.effective) / total);
+        const float krigingVariance = static_cast<float>(variance) * part;
+        for (int i = 0; i < n; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            float* const sum = sums_.data() + index_[k];
+            sum[plane(out.variance())] += predicted_[k] * krigingVariance;
+            sum[plane(out.leverage())] += predicted_[k] * std::min(1.f, weights_[k] * part);
+        }
         estimates_.resize(static_cast<std::size_t>(4 * padded));
         float* const estimate = estimates_.data();
         float *const about = estimate + padded, *const sum = about + padded, *const square = sum + padded;

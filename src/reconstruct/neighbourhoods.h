@@ -26,7 +26,9 @@ struct EstimatePlanes {
     int sum(int channel) const { return 1 + channel; }              ///< of weight * (estimate - reference)
     int square(int colour) const { return 1 + radiance + colour; }  ///< of weight * (estimate - reference)^2
     int variance() const { return 1 + radiance + 3; }               ///< of weight * kriging variance
-    int perHalf() const { return 1 + radiance + 4; }
+    /// Of weight * what the pixel's datum weighs in its own estimate, the diagonal of the hat matrix.
+    int leverage() const { return 1 + radiance + 4; }
+    int perHalf() const { return 1 + radiance + 5; }
     int channels() const { return 2 * perHalf(); }
 };
 

@@ -40,6 +40,8 @@ LimitedRow PixelData::fillRow(int y) {
         data_.row(out_.gap(), y)[x] = hole ? fillHole(x, y, row) : 0;
         limitPixel(x, y, row);
     }
+    for (int k = 0; k < 2 * layout_.features; ++k)
+        std::copy_n(gathered_.row(planes_.feature + k, y), width_, raw_.row(k, y));
     return row;
 }
 
@@ -99,6 +101,7 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
     float squares[3];
     for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares + c);
 
+    for (int c = 0; c < 3; ++c) data_.row(out_.removed() + c, y)[x] = 0;
     const float brightest = raw(planes_.brightestLuminance);
     const bool exact = raw(planes_.stated) > 0 && squares[0] + squares[1] + squares[2] == 0;
     if (robust_ && brightest > 0 && !exact) {
@@ -116,6 +119,7 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
                     const float both = (*mean * halfCount + other * (n - halfCount)) / n;
                     squares[c] =
                         std::max(0.f, squares[c] + step * (2 * old + step - 2 * both) - step * step / n);
+                    data_.row(out_.removed() + c, y)[x] = -step / n;
                 }
                 *mean += step / halfCount;
             }

@@ -23,11 +23,21 @@ struct DataPlanes {
     int count() const { return 2 * radiance + 2; }
     int stated() const { return 2 * radiance + 3; }  ///< 1 where the dump states the error variance
     int gap() const { return 2 * radiance + 4; }  ///< pixels to the nearest samples: 0 where there are some
-    int channels() const { return 2 * radiance + 5; }
+    int removed() const { return 2 * radiance + 5; }  ///< R, G, B taken off the mean as a firefly's
+    int channels() const { return 2 * radiance + 8; }
 
     int mean(int half) const { return half == 0 ? meanA() : meanB(); }
     int halfCount(int half) const { return half == 0 ? countA() : countB(); }
 };
+
+/// Mean of all samples of a pixel; 0 where it has none.
+inline double plainMean(const RowRing& data, const DataPlanes& planes, int channel, int x, int y) {
+    const double nA = data.row(planes.countA(), y)[x], nB = data.row(planes.countB(), y)[x];
+    if (nA + nB <= 0) return 0;
+    return (nA * static_cast<double>(data.row(planes.meanA() + channel, y)[x]) +
+            nB * static_cast<double>(data.row(planes.meanB() + channel, y)[x])) /
+           (nA + nB);
+}
 
 /// Degrees of freedom of a pixel of one sample, whose variance is what its neighbours differ from it by.
 inline constexpr float kBorrowedFreedom = 1e-3f;
@@ -47,7 +57,8 @@ class PixelData {
   public:
     /// `scale`: pixels of the image along each axis for one of the dump; `robust`: Fireflies::Robust.
     PixelData(const SampleSource& dump, const SampleLayout& layout, const GatheredPlanes& planes, int scale,
-              int width, int height, bool robust, RowRing& gathered, RowRing& data, RowRing& squares)
+              int width, int height, bool robust, RowRing& gathered, RowRing& data, RowRing& squares,
+              RowRing& raw)
         : dump_(dump),
           layout_(layout),
           planes_(planes),
@@ -59,7 +70,8 @@ class PixelData {
           robust_(robust),
           gathered_(gathered),
           data_(data),
-          squares_(squares) {}
+          squares_(squares),
+          raw_(raw) {}
 
     /// Rows that must be gathered above and below the ones that are filled.
     static int reach(int scale);
@@ -67,7 +79,8 @@ class PixelData {
     /// To be called before the rows [first, until) are filled: reads the dump once more if one of their
     /// pixels has no samples within kHoleReach.
     void prepare(int first, int until);
-    /// Fills row y of data and squares; rows reach() around it are gathered.
+    /// Fills row y of data, squares and raw (f features, then the error variances of their means); rows
+    /// reach() around it are gathered.
     LimitedRow fillRow(int y);
 
   private:
@@ -88,7 +101,7 @@ class PixelData {
     DataPlanes out_;
     int scale_, width_, height_, radiance_;
     bool robust_;
-    RowRing &gathered_, &data_, &squares_;
+    RowRing &gathered_, &data_, &squares_, &raw_;
     std::unique_ptr<GapField> far_;
 };
 

@@ -57,11 +57,11 @@ VLX_WIDE void addWeighted(const float* const* there, const float* const* here, c
 
 }  // namespace
 
-void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, const GatheredPlanes& planes,
-                       int x, int y, int width, int height, RowRing& features) {
+void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
+                       RowRing& features) {
     const int right = std::min(width, x + kTile), bottom = std::min(height, y + kTile);
     PatchTile tile{x, y, 0, {}, {}};
-    std::vector<float> scratch, distances(kTile * kTile), weights(kTile), raw(kTileSide * kTileSide);
+    std::vector<float> scratch, distances(kTile * kTile), weights(kTile), errors(kTileSide * kTileSide);
     for (int first = 0; first < layout.features;) {
         int last = first;
         while (last < layout.features &&
@@ -73,8 +73,8 @@ void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, cons
         tile.variance.resize(tile.value.size());
         bool noisy = false;
         for (int c = 0; c < channels; ++c) {
-            copyTile(gathered, planes.feature + first + c, x, y, width, height, tile.values(c));
-            copyTile(gathered, planes.featureError + first + c, x, y, width, height, raw.data());
+            copyTile(raw, first + c, x, y, width, height, tile.values(c));
+            copyTile(raw, layout.features + first + c, x, y, width, height, errors.data());
             float* out = tile.variances(c);
             for (int row = 0; row < kTileSide; ++row)
                 for (int i = 0; i < kTileSide; ++i) {
@@ -82,10 +82,10 @@ void prefilterFeatures(const RowRing& gathered, const SampleLayout& layout, cons
                     int count = 0;
                     for (int r = std::max(0, row - 1); r <= std::min(kTileSide - 1, row + 1); ++r)
                         for (int k = std::max(0, i - 1); k <= std::min(kTileSide - 1, i + 1); ++k) {
-                            sum += raw[static_cast<std::size_t>(r * kTileSide + k)];
+                            sum += errors[static_cast<std::size_t>(r * kTileSide + k)];
                             ++count;
                         }
-                    const float own = raw[static_cast<std::size_t>(row * kTileSide + i)];
+                    const float own = errors[static_cast<std::size_t>(row * kTileSide + i)];
                     out[row * kTileSide + i] = 0.5f * (own + sum / static_cast<float>(count));
                     noisy = noisy || own > 0;
                 }
