@@ -111,9 +111,7 @@ void Combination::store(int x, int y, const Eigen::VectorXd& weights) {
     const float n = data_.row(planes_.count(), y)[x];
     const double rest = 1 - weights.sum();
     const auto share = [&](int j) { return j == 0 ? rest : weights[j - 1]; };
-    const auto put = [&](int plane, double value) {
-        combined_.row(plane, y)[x] = static_cast<float>(value);
-    };
+    const auto put = [&](int plane, double value) { combined_.row(plane, y)[x] = static_cast<float>(value); };
     double leverage = share(m);
     for (int j = 0; j < m; ++j)
         leverage += share(j) * static_cast<double>(
@@ -138,9 +136,9 @@ void Combination::store(int x, int y, const Eigen::VectorXd& weights) {
         // or the other.
         double variance = 0;
         for (int j = 0; j <= m; ++j) {
-            const double within = j == m ? variances_.row(c, y)[x] / std::max(1.f, n)
-                                         : estimates_[static_cast<std::size_t>(j)].row(
-                                               models_.variance() + c, y)[x];
+            const double within =
+                j == m ? variances_.row(c, y)[x] / std::max(1.f, n)
+                       : estimates_[static_cast<std::size_t>(j)].row(models_.variance() + c, y)[x];
             const double d = both(j) - value;
             variance += share(j) * std::max(within, d * d);
         }

@@ -16,16 +16,16 @@ struct ModelPlanes {
     int radiance = 3;
     int half(int which) const { return which * radiance; }  ///< estimates of radiance channels from a half
     int variance() const { return 2 * radiance; }           ///< R, G, B: of the mean of both halves'
-    int leverage() const { return 2 * radiance + 3; }  ///< what the pixel's datum weighs in its estimate
+    int leverage() const { return 2 * radiance + 3; }       ///< what the pixel's datum weighs in its estimate
     int channels() const { return 2 * radiance + 4; }
 };
 
 /// What all models together say of a pixel.
 struct CombinedPlanes {
     int radiance = 3;
-    int value() const { return 0; }  ///< radiance channels
+    int value() const { return 0; }                             ///< radiance channels
     int half(int which) const { return radiance + 3 * which; }  ///< R, G, B from a half
-    int variance() const { return radiance + 6; }  ///< R, G, B: but for what halves differ in
+    int variance() const { return radiance + 6; }               ///< R, G, B: but for what halves differ in
     int leverage() const { return radiance + 9; }
     int channels() const { return radiance + 10; }
 };

@@ -24,10 +24,10 @@ namespace {
 constexpr int kReadRows = 16;
 constexpr int kFilledRows = 32;  // pixels of data filled at a time
 // Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them.
-constexpr int kGatheredRows = 96;    // those filled, 11 around them, and those read at a time
-constexpr int kAheadRows = 128;      // that the coarse level makes the fine one's data run ahead
-constexpr int kCorrectedRows = 96;   // and differences
-constexpr int kFinishingRows = 96;   // of 32 that go out together, and the light around them
+constexpr int kGatheredRows = 96;   // those filled, 11 around them, and those read at a time
+constexpr int kAheadRows = 128;     // that the coarse level makes the fine one's data run ahead
+constexpr int kCorrectedRows = 96;  // and differences
+constexpr int kFinishingRows = 96;  // of 32 that go out together, and the light around them
 
 // What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries
 // that it maps, and each thread's tiles.
@@ -84,22 +84,23 @@ class Pipeline {
           clock_(report_),
           picture_(measurePictureScale(dump, layout_)),
           gathered_(width_, planes_.channels, kept(kGatheredRows)),
-          fine_(layout_, modelsOf(options.quality, false), width_, height_, halved_ ? kAheadRows : 0,
-                picture_, [this](int until) { fill(until); }, report_, clock_),
+          fine_(
+              layout_, modelsOf(options.quality, false), width_, height_, halved_ ? kAheadRows : 0, picture_,
+              [this](int until) { fill(until); }, report_, clock_),
           pixels_(dump, layout_, planes_, options.scale, width_, height_,
-                  options.fireflies == Fireflies::Robust, gathered_, fine_.data(), fine_.squares(),
-                  fine_.raw()),
+                  options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
           differences_(width_, halved_ ? Correction::differencePlanes(radiance_) : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           clean_(width_, radiance_, kept(kFinishingRows)),
           light_(width_, Finishing::kLightPlanes, kept(kFinishingRows)),
-          finishing_(layout_, options.strength, options.scale, picture_, fine_,
-                     halved_ ? corrected_ : fine_.combined(), clean_, light_) {
+          finishing_(layout_, options.strength, options.scale, picture_, fine_.rows(),
+                     halved_ ? corrected_ : fine_.rows().combined, clean_, light_) {
         if (halved_) {
             coarse_ = std::make_unique<Level>(
                 layout_, modelsOf(options.quality, true), (width_ + 1) / 2, (height_ + 1) / 2, kAheadRows,
                 picture_, [this](int until) { fill(2 * until); }, report_, clock_);
-            correction_ = std::make_unique<Correction>(fine_, *coarse_, differences_, corrected_);
+            correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
+                                                       corrected_);
         }
         requireMemory(dump.path(), ringBytes(), "rows as wide as these");
         if (options.maxMemory > 0) limitRowsRead();
@@ -115,6 +116,10 @@ class Pipeline {
         while (finishedRows_ < endRow_) {
             finish(std::min(endRow_, finishedRows_ + kTile));
             if (progress_) progress_(finishedRows_ - firstRow_, endRow_ - firstRow_);
+        }
+        if (luminance_ > 0) {
+            report_.energyRemoved = removed_ / luminance_;
+            report_.energyReturned = returned_ / luminance_;
         }
         for (const auto& [stage, seconds] : report_.seconds)
             (stage == "read" ? report_.readSeconds : report_.solveSeconds) += seconds;
@@ -249,10 +254,11 @@ class Pipeline {
                 report_.farPixels += of.farPixels;
                 removed_ += of.luminance;
             }
-            report_.energyRemoved = luminance_ > 0 ? removed_ / luminance_ : 0;
             if (coarse_)
-                parallelFor(first / 2, (end + 1) / 2,
-                            [&](std::int64_t y) { halveRow(fine_, static_cast<int>(y), *coarse_); });
+                parallelFor(first / 2, (end + 1) / 2, [&](std::int64_t y) {
+                    halveRow(fine_.pixels(), width_, height_, radiance_, layout_.features,
+                             static_cast<int>(y), coarse_->pixels());
+                });
             filledRows_ = end;
             clock_.addTo("statistics");
         }
@@ -289,13 +295,16 @@ class Pipeline {
     void finish(int until) {
         until = std::min(until, height_);
         clean(until + Finishing::kLightReach);
-        std::vector<std::int64_t> exact(static_cast<std::size_t>(until - finishedRows_));
+        std::vector<Finishing::Counts> counts(static_cast<std::size_t>(until - finishedRows_));
         parallelFor(finishedRows_, until, [&](std::int64_t y) {
             const auto row = static_cast<int>(y) - finishedRows_;
-            exact[static_cast<std::size_t>(row)] =
+            counts[static_cast<std::size_t>(row)] =
                 finishing_.outputRow(static_cast<int>(y), rows_.at(0, row));
         });
-        for (const std::int64_t of : exact) report_.exactPixels += of;
+        for (const Finishing::Counts& of : counts) {
+            report_.exactPixels += of.exact;
+            returned_ += of.returned;
+        }
         clock_.addTo("finishing");
         sink_(rows_.pixels.data(), until - finishedRows_);
         finishedRows_ = until;
@@ -325,7 +334,7 @@ class Pipeline {
     int firstRow_ = 0, endRow_ = 0;  // of the band
     int gatheredRows_ = 0, filledRows_ = 0, differenceRows_ = 0, correctedRows_ = 0, cleanRows_ = 0,
         finishedRows_ = 0;
-    double luminance_ = 0, removed_ = 0;
+    double luminance_ = 0, removed_ = 0, returned_ = 0;
     Image rows_;  // finished, on their way out
 };
 

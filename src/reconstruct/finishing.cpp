@@ -39,20 +39,19 @@ void forNeighbours(int x, int y, int width, int height, F f) {
 }  // namespace
 
 Finishing::Finishing(const SampleLayout& layout, double strength, int scale, const PictureScale& picture,
-                     const Level& level, const RowRing& combined, RowRing& clean, RowRing& light)
+                     const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light)
     : layout_(layout),
       planes_{layout.radiance},
       combinedPlanes_{layout.radiance},
       strength_(strength),
       scale_(scale),
-      width_(level.width()),
-      height_(level.height()),
+      width_(level.width),
+      height_(level.height),
       radiance_(layout.radiance),
       picture_(picture),
-      level_(level),
-      data_(level.data()),
-      features_(level.features()),
-      variances_(level.variances()),
+      data_(level.data),
+      features_(level.features),
+      variances_(level.variances),
       combined_(combined),
       clean_(clean),
       light_(light) {
@@ -174,17 +173,18 @@ std::vector<double> Finishing::returned(int y) const {
     return shares;
 }
 
-std::int64_t Finishing::outputRow(int y, float* out) const {
+Finishing::Counts Finishing::outputRow(int y, float* out) const {
     const std::vector<double> shares = returned(y);
-    std::int64_t exactPixels = 0;
+    Counts counts;
     for (int x = 0; x < width_; ++x, out += radiance_ + 3) {
         const double n = data_.row(planes_.count(), y)[x];
         const bool exact = isExact(x, y);
-        exactPixels += exact;
+        counts.exact += exact;
         double shared[3];
         sharedVariance(x, y, shared);
         const double gap = data_.row(planes_.gap(), y)[x];
         const double strength = n > 0 ? strength_ : 1;
+        double back[3] = {};
         for (int c = 0; c < radiance_; ++c) {
             const double mean = plainMean(data_, planes_, c, x, y);
             double value = clean_.row(c, y)[x];
@@ -193,7 +193,10 @@ std::int64_t Finishing::outputRow(int y, float* out) const {
                 value = coverage(value);
             } else {
                 const int colour = colour_[static_cast<std::size_t>(c)];
-                value *= 1 + shares[static_cast<std::size_t>((colour < 0 ? 3 : colour) * width_ + x)];
+                const double more =
+                    value * shares[static_cast<std::size_t>((colour < 0 ? 3 : colour) * width_ + x)];
+                value += more;
+                if (c < 3 && !exact) back[c] = strength * more;
                 if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0) value = std::max(0.0, value);
             }
             const double chosen = exact ? mean : value;
@@ -208,8 +211,9 @@ std::int64_t Finishing::outputRow(int y, float* out) const {
             out[radiance_ + c] = static_cast<float>(
                 exact ? 0 : std::sqrt(strength * variance + (1 - strength) * meanVariance));
         }
+        counts.returned += n * luminance(back);
     }
-    return exactPixels;
+    return counts;
 }
 
 /// Whether the dump states that the pixel, and every one that its error variance was pooled over, has none.

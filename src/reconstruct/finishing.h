@@ -16,9 +16,10 @@ class Finishing {
     static constexpr int kLightReach = 16;  ///< pixels: triangular window of 33 x 33 pixels
     static constexpr int kAlikeReach = 2;   ///< of the error map: 5 x 5 pixels
 
-    /// `combined`: CombinedPlanes; `clean`: radiance channels; `light`: kLightPlanes.
+    /// `combined`: CombinedPlanes, instead of the level's own; `clean`: radiance channels; `light`:
+    /// kLightPlanes.
     Finishing(const SampleLayout& layout, double strength, int scale, const PictureScale& picture,
-              const Level& level, const RowRing& combined, RowRing& clean, RowRing& light);
+              const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light);
 
     /// Planes of `light`: what fireflies lost of R, G, B; the square of it; R, G, B.
     static constexpr int kLightPlanes = 7;
@@ -30,9 +31,13 @@ class Finishing {
     void cleanRow(int y);
     /// Row y of `light`, weighted sums along the row. Clean row y is there.
     void lightRow(int y);
-    /// Row y of the picture: radiance channels and stddev of R, G, B, interleaved; how many of its pixels are
-    /// exact. Rows of kLightReach around it are there.
-    std::int64_t outputRow(int y, float* out) const;
+    struct Counts {
+        std::int64_t exact = 0;  ///< pixels
+        double returned = 0;     ///< luminance, summed over samples
+    };
+    /// Row y of the picture: radiance channels and stddev of R, G, B, interleaved. Rows of kLightReach around
+    /// it are there.
+    Counts outputRow(int y, float* out) const;
 
   private:
     double sampleVariance(int c, int x, int y) const;
@@ -48,7 +53,6 @@ class Finishing {
     int scale_, width_, height_, radiance_;
     std::vector<int> colour_;  // of each radiance channel: 0 to 2, or -1: none of these
     const PictureScale& picture_;
-    const Level& level_;
     const RowRing &data_, &features_, &variances_, &combined_;
     RowRing &clean_, &light_;
 };

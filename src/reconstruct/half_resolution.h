@@ -13,9 +13,10 @@ inline constexpr int kLeastHalved = 32;
 /// Rows of `fine` that row y of the coarse level stands for: 2 y and 2 y + 1, or the last.
 /// The data of each 2 x 2 pixels as one: means of the halves, which stay the same samples; counts k^2 / sum
 /// 1/n of k pixels with data, so that a variance over a count stays the error variance; sums of squares and
-/// degrees of freedom added; features averaged with their error variances. Fills row y of coarse.data(),
-/// squares() and raw().
-void halveRow(const Level& fine, int y, Level& coarse);
+/// degrees of freedom added; features averaged with their error variances. `width` and `height` are the fine
+/// level's. Fills row y of coarse.
+void halveRow(const PixelRows& fine, int width, int height, int radiance, int features, int y,
+              PixelRows& coarse);
 
 /// L - K, where L = K + up(C - down(K)) corrects the fine level's estimate K by the coarse one's C, and what
 /// stacking needs of it. Refers to its levels and rings. Rows may be worked on at the same time.
@@ -23,9 +24,9 @@ class Correction {
   public:
     static constexpr int kReach = 3;  ///< triangular window of 7 x 7 pixels
 
-    Correction(const Level& fine, const Level& coarse, RowRing& differences, RowRing& corrected)
-        : fine_(fine), coarse_(coarse), planes_{fine.radiance()}, differences_(differences),
-          corrected_(corrected) {}
+    Correction(int radiance, const LevelRows& fine, const LevelRows& coarse, RowRing& differences,
+               RowRing& corrected)
+        : planes_{radiance}, fine_(fine), coarse_(coarse), differences_(differences), corrected_(corrected) {}
 
     static int differencePlanes(int radiance) { return radiance + 8; }
     /// Row y of `differences`: combined rows from y - 3 to y + 3 of the fine level, and from y / 2 - 1 to
@@ -44,8 +45,8 @@ class Correction {
     int gain() const { return planes_.radiance + 6; }
     int square() const { return planes_.radiance + 7; }
 
-    const Level &fine_, &coarse_;
     CombinedPlanes planes_;
+    LevelRows fine_, coarse_;
     RowRing &differences_, &corrected_;
 };
 

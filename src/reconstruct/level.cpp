@@ -14,7 +14,7 @@ namespace {
 // tiles of 32 rows, centres that reach 15 and patches that reach 3, data are filled 160 rows ahead of the row
 // that is combined; the others are used up earlier.
 constexpr int kDataRows = 224;
-constexpr int kRawRows = 128;  // and squares
+constexpr int kRawRows = 128;      // and squares
 constexpr int kFeatureRows = 160;  // and variances: finishing looks back at them
 constexpr int kSumRows = 128;
 constexpr int kEstimateRows = 64;  // and moments
@@ -34,14 +34,14 @@ Level::Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models,
       source_(std::move(source)),
       report_(report),
       clock_(clock),
-      data_(width, DataPlanes{radiance_}.channels(), kept(kDataRows + ahead)),
-      squares_(width, kSquaresPlanes, kept(kRawRows + ahead)),
-      raw_(width, 2 * layout.features, kept(kRawRows + ahead)),
+      pixels_{RowRing(width, DataPlanes{radiance_}.channels(), kept(kDataRows + ahead)),
+              RowRing(width, kSquaresPlanes, kept(kRawRows + ahead)),
+              RowRing(width, 2 * layout.features, kept(kRawRows + ahead))},
       features_(width, 2 * layout.features, kept(kFeatureRows)),
       variances_(width, 3, kept(kFeatureRows)),
       moments_(width, Combination::momentPlanes(static_cast<int>(models_.size())), kept(kEstimateRows)),
       combined_(width, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
-      combination_(radiance_, width, height, data_, variances_, estimates_, moments_, combined_) {
+      combination_(radiance_, width, height, pixels_.data, variances_, estimates_, moments_, combined_) {
     for (std::size_t m = 0; m < models_.size(); ++m) {
         sums_.emplace_back(width, EstimatePlanes{radiance_}.channels(), kept(kSumRows));
         estimates_.emplace_back(width, ModelPlanes{radiance_}.channels(), kept(kEstimateRows));
@@ -61,7 +61,8 @@ int Level::startAbove(int first) {
 
 std::uint64_t Level::ringBytes() const {
     std::uint64_t bytes = 0;
-    for (const RowRing* ring : {&data_, &squares_, &raw_, &features_, &variances_, &moments_, &combined_})
+    for (const RowRing* ring :
+         {&pixels_.data, &pixels_.squares, &pixels_.raw, &features_, &variances_, &moments_, &combined_})
         bytes += ring->bytes();
     for (const auto* list : {&sums_, &estimates_})
         for (const RowRing& ring : *list) bytes += ring.bytes();
@@ -76,7 +77,8 @@ void Level::prefilter(int until) {
         source_(featureRows_ + kTile + kTileMargin);
         const int y = featureRows_;
         parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
-            prefilterFeatures(raw_, layout_, static_cast<int>(tile) * kTile, y, width_, height_, features_);
+            prefilterFeatures(pixels_.raw, layout_, static_cast<int>(tile) * kTile, y, width_, height_,
+                              features_);
         });
         featureRows_ = std::min(height_, featureRows_ + kTile);
         clock_.addTo("features");
@@ -89,7 +91,7 @@ void Level::smooth(int until) {
     prefilter(until + kVarianceReach);
     source_(until + kVarianceReach);
     parallelFor(varianceRows_, until, [&](std::int64_t y) {
-        smoothVariances(squares_, data_, {radiance_}, features_, layout_.features, picture_,
+        smoothVariances(pixels_.squares, pixels_.data, {radiance_}, features_, layout_.features, picture_,
                         static_cast<int>(y), width_, height_, variances_);
     });
     varianceRows_ = until;
@@ -102,7 +104,7 @@ void Level::krige(int until) {
     while (krigedRows_ < until) {
         const int y = krigedRows_;
         smooth(y + kTile + kTileMargin);
-        TileInput input{&data_,        &features_,     &variances_, {radiance_}, layout_.features,
+        TileInput input{&pixels_.data, &features_,     &variances_, {radiance_}, layout_.features,
                         layout_.group, layout_.groups, width_,      height_};
         // Rows that this tile row is the first to reach.
         for (RowRing& ring : sums_)
@@ -161,12 +163,12 @@ void Level::finishRow(std::size_t m, int y) {
             for (int c = 0; c < radiance_; ++c) {
                 float& estimate = estimates_[m].row(out.half(half) + c, y)[x];
                 if (weight <= 0) {  // no neighbourhood with data reaches it
-                    estimate = data_.row(data.mean(half) + c, y)[x];
+                    estimate = pixels_.data.row(data.mean(half) + c, y)[x];
                     if (c < 3) variance[c] += 2 * static_cast<double>(variances_.row(c, y)[x]);
                     continue;
                 }
                 const double shift = sums_[m].row(from + planes.sum(c), y)[x] / weight;
-                estimate = static_cast<float>(reference(data_, data, c, x, y) + shift);
+                estimate = static_cast<float>(reference(pixels_.data, data, c, x, y) + shift);
                 if (c >= 3) continue;
                 const double spread =
                     std::max(0.0, sums_[m].row(from + planes.square(c), y)[x] / weight - shift * shift);
@@ -187,7 +189,7 @@ void Level::shrinkRow(int y) {
     RowRing &first = estimates_.front(), &small = estimates_.back();
     const ModelPlanes planes{radiance_};
     for (int x = 0; x < width_; ++x) {
-        const double n = std::max(1.f, data_.row(DataPlanes{radiance_}.count(), y)[x]);
+        const double n = std::max(1.f, pixels_.data.row(DataPlanes{radiance_}.count(), y)[x]);
         double apart = 0, noise = 0;
         for (int c = 0; c < 3; ++c) {
             const double a = first.row(c, y)[x], b = first.row(radiance_ + c, y)[x];

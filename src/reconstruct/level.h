@@ -15,10 +15,19 @@
 /// The picture at one resolution, from its data to the combination of its models: drift_kriging.h, 2 to 5.
 namespace vlx {
 
+/// What a level holds when it is combined.
+struct LevelRows {
+    int width, height;
+    const RowRing& data;       ///< DataPlanes
+    const RowRing& features;   ///< prefilter.h
+    const RowRing& variances;  ///< of one sample of R, G, B
+    const RowRing& combined;   ///< CombinedPlanes
+};
+
 /// Stages, each a ring of rows that is filled just ahead of what the next one needs.
 class Level {
   public:
-    /// What fills data(), squares() and raw() up to (not including) a row, which may lie below the picture.
+    /// What fills pixels() up to (not including) a row, which may lie below the picture.
     using Source = std::function<void(int until)>;
 
     /// `ahead`: rows that the source may fill beyond what this level asks for. The last model is the small
@@ -29,28 +38,16 @@ class Level {
     Level(const Level&) = delete;
     Level& operator=(const Level&) = delete;
 
-    /// Lets each stage start just far enough above row `first` of combined() for that row to be what it is in
-    /// the whole picture. The first row of data that is needed.
+    /// Lets each stage start just far enough above row `first` of the combination for that row to be what it
+    /// is in the whole picture. The first row of data that is needed.
     int startAbove(int first);
-    /// Fills combined() up to `until`.
+    /// Fills the combination up to `until`.
     void combine(int until);
 
     /// Of all rows that are kept; none is taken yet when the level is made.
     std::uint64_t ringBytes() const;
-    int width() const { return width_; }
-    int height() const { return height_; }
-    int radiance() const { return radiance_; }
-    int featureCount() const { return layout_.features; }
-
-    RowRing& data() { return data_; }        ///< pixel_data.h
-    RowRing& squares() { return squares_; }  ///< kSquaresPlanes
-    RowRing& raw() { return raw_; }          ///< f features, then the error variances of their means
-    const RowRing& data() const { return data_; }
-    const RowRing& squares() const { return squares_; }
-    const RowRing& raw() const { return raw_; }
-    const RowRing& features() const { return features_; }    ///< prefilter.h
-    const RowRing& variances() const { return variances_; }  ///< of one sample of R, G, B
-    const RowRing& combined() const { return combined_; }    ///< CombinedPlanes
+    PixelRows& pixels() { return pixels_; }  ///< for the source to fill
+    LevelRows rows() const { return {width_, height_, pixels_.data, features_, variances_, combined_}; }
 
   private:
     int kept(int rows) const { return std::min(rows, height_); }
@@ -68,7 +65,8 @@ class Level {
     Source source_;
     ReconstructionReport& report_;
     StageClock& clock_;
-    RowRing data_, squares_, raw_, features_, variances_;
+    PixelRows pixels_;
+    RowRing features_, variances_;
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: ModelPlanes
     RowRing moments_, combined_;
     Combination combination_;

@@ -37,11 +37,11 @@ LimitedRow PixelData::fillRow(int y) {
     LimitedRow row;
     for (int x = 0; x < width_; ++x) {
         const bool hole = gathered_.row(planes_.count, y)[x] == 0;
-        data_.row(out_.gap(), y)[x] = hole ? fillHole(x, y, row) : 0;
+        out_.data.row(dataPlanes_.gap(), y)[x] = hole ? fillHole(x, y, row) : 0;
         limitPixel(x, y, row);
     }
     for (int k = 0; k < 2 * layout_.features; ++k)
-        std::copy_n(gathered_.row(planes_.feature + k, y), width_, raw_.row(k, y));
+        std::copy_n(gathered_.row(planes_.feature + k, y), width_, out_.raw.row(k, y));
     return row;
 }
 
@@ -92,16 +92,17 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
     const auto raw = [&](int plane) { return gathered_.row(plane, y)[x]; };
     const float nA = raw(planes_.countA), nB = raw(planes_.countB);
     const float n = raw(planes_.count);
-    data_.row(out_.count(), y)[x] = n;
-    data_.row(out_.countA(), y)[x] = nA;
-    data_.row(out_.countB(), y)[x] = nB;
-    data_.row(out_.stated(), y)[x] = raw(planes_.stated);
+    out_.data.row(dataPlanes_.count(), y)[x] = n;
+    out_.data.row(dataPlanes_.countA(), y)[x] = nA;
+    out_.data.row(dataPlanes_.countB(), y)[x] = nB;
+    out_.data.row(dataPlanes_.stated(), y)[x] = raw(planes_.stated);
     for (int half = 0; half < 2; ++half)
-        for (int c = 0; c < radiance_; ++c) data_.row(out_.mean(half) + c, y)[x] = halfMean(half, c, x, y);
+        for (int c = 0; c < radiance_; ++c)
+            out_.data.row(dataPlanes_.mean(half) + c, y)[x] = halfMean(half, c, x, y);
     float squares[3];
     for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares + c);
 
-    for (int c = 0; c < 3; ++c) data_.row(out_.removed() + c, y)[x] = 0;
+    for (int c = 0; c < 3; ++c) out_.data.row(dataPlanes_.removed() + c, y)[x] = 0;
     const float brightest = raw(planes_.brightestLuminance);
     const bool exact = raw(planes_.stated) > 0 && squares[0] + squares[1] + squares[2] == 0;
     if (robust_ && brightest > 0 && !exact) {
@@ -113,13 +114,13 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
             for (int c = 0; c < radiance_; ++c) {
                 if (c == layout_.alpha) continue;
                 const float old = raw(planes_.brightest + c), step = change * old;
-                float* const mean = data_.row(out_.mean(half) + c, y) + x;
+                float* const mean = out_.data.row(dataPlanes_.mean(half) + c, y) + x;
                 if (c < 3) {
-                    const float other = data_.row(out_.mean(1 - half) + c, y)[x];
+                    const float other = out_.data.row(dataPlanes_.mean(1 - half) + c, y)[x];
                     const float both = (*mean * halfCount + other * (n - halfCount)) / n;
                     squares[c] =
                         std::max(0.f, squares[c] + step * (2 * old + step - 2 * both) - step * step / n);
-                    data_.row(out_.removed() + c, y)[x] = -step / n;
+                    out_.data.row(dataPlanes_.removed() + c, y)[x] = -step / n;
                 }
                 *mean += step / halfCount;
             }
@@ -129,9 +130,9 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
     }
     float freedom = raw(planes_.freedom);
     if (n == 1 && freedom == 0) borrowSquares(x, y, squares, freedom);
-    for (int c = 0; c < 3; ++c) squares_.row(c, y)[x] = squares[c];
-    squares_.row(3, y)[x] = freedom;
-    squares_.row(4, y)[x] = n;
+    for (int c = 0; c < 3; ++c) out_.squares.row(c, y)[x] = squares[c];
+    out_.squares.row(3, y)[x] = freedom;
+    out_.squares.row(4, y)[x] = n;
 }
 
 /// Mean of a half. Where a pixel has samples, but none of it, what its neighbours have on average stands in,

@@ -45,6 +45,13 @@ inline constexpr float kBorrowedFreedom = 1e-3f;
 /// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples.
 inline constexpr int kSquaresPlanes = 5;
 
+/// What kriging starts from, a ring of rows each.
+struct PixelRows {
+    RowRing data;     ///< DataPlanes
+    RowRing squares;  ///< kSquaresPlanes
+    RowRing raw;      ///< f features, then the error variances of their means
+};
+
 /// What was taken off the fireflies of a row, and what was filled in.
 struct LimitedRow {
     std::int64_t samples = 0;
@@ -57,21 +64,18 @@ class PixelData {
   public:
     /// `scale`: pixels of the image along each axis for one of the dump; `robust`: Fireflies::Robust.
     PixelData(const SampleSource& dump, const SampleLayout& layout, const GatheredPlanes& planes, int scale,
-              int width, int height, bool robust, RowRing& gathered, RowRing& data, RowRing& squares,
-              RowRing& raw)
+              int width, int height, bool robust, RowRing& gathered, PixelRows& out)
         : dump_(dump),
           layout_(layout),
           planes_(planes),
-          out_{layout.radiance},
+          dataPlanes_{layout.radiance},
           scale_(scale),
           width_(width),
           height_(height),
           radiance_(layout.radiance),
           robust_(robust),
           gathered_(gathered),
-          data_(data),
-          squares_(squares),
-          raw_(raw) {}
+          out_(out) {}
 
     /// Rows that must be gathered above and below the ones that are filled.
     static int reach(int scale);
@@ -79,8 +83,7 @@ class PixelData {
     /// To be called before the rows [first, until) are filled: reads the dump once more if one of their
     /// pixels has no samples within kHoleReach.
     void prepare(int first, int until);
-    /// Fills row y of data, squares and raw (f features, then the error variances of their means); rows
-    /// reach() around it are gathered.
+    /// Fills row y; rows reach() around it are gathered.
     LimitedRow fillRow(int y);
 
   private:
@@ -98,10 +101,11 @@ class PixelData {
     const SampleSource& dump_;
     const SampleLayout& layout_;
     const GatheredPlanes& planes_;
-    DataPlanes out_;
+    DataPlanes dataPlanes_;
     int scale_, width_, height_, radiance_;
     bool robust_;
-    RowRing &gathered_, &data_, &squares_, &raw_;
+    RowRing& gathered_;
+    PixelRows& out_;
     std::unique_ptr<GapField> far_;
 };
 

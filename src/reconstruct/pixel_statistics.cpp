@@ -85,10 +85,6 @@ void measureScales(const SampleSource& dump, SampleLayout& layout, std::size_t f
     }
 }
 
-float luminance(const double* rgb) {
-    return static_cast<float>(std::max(0.0, 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]));
-}
-
 /// Whether every sample says how uncertain it is.
 bool varianceKnown(const SampleBand& band, const SampleLayout& layout,
                    const std::vector<std::size_t>& samples) {

@@ -27,6 +27,12 @@ struct SampleLayout {
     int variance = -1;   ///< index in `names` of the first of kVarianceChannels, all three of which are there
 };
 
+/// Of linear R, G, B with the primaries of Rec. 709; not negative.
+inline float luminance(const double* rgb) {
+    const double y = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    return static_cast<float>(y > 0 ? y : 0);
+}
+
 /// The channels that options.radiance stands for.
 std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options);
 

@@ -13,9 +13,10 @@ inline constexpr int kFeatureReach = 5;   ///< pixels around a pixel that its fe
 inline constexpr int kVarianceReach = 5;  ///< and its error variance
 
 /// Prefilters the features (`raw`: f of them, then the error variances of their means) of the rows
-/// [y, y + kTile) at columns [x, x + kTile) (cut to the image): non-local means in each group, weights exp(-d) of patch_similarity.h. Writes the features (planes 0 to f - 1) and
-/// their error variances (f to 2 f - 1: sum w^2 v / (sum w)^2). A group without noise is copied. The error
-/// variance that steers the weights is averaged with that of the 3 x 3 pixels around.
+/// [y, y + kTile) at columns [x, x + kTile) (cut to the image): non-local means in each group, weights
+/// exp(-d) of patch_similarity.h. Writes the features (planes 0 to f - 1) and their error variances (f to 2 f
+/// - 1: sum w^2 v / (sum w)^2). A group without noise is copied. The error variance that steers the weights
+/// is averaged with that of the 3 x 3 pixels around.
 void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
                        RowRing& features);
 

@@ -24,6 +24,7 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
         {"droppedSamples", report.droppedSamples},
         {"limitedSamples", report.limitedSamples},
         {"energyRemoved", report.energyRemoved},
+        {"energyReturned", report.energyReturned},
         {"emptyPixels", report.emptyPixels},
         {"farPixels", report.farPixels},
         {"exactPixels", report.exactPixels},
@@ -152,8 +153,8 @@ std::string toText(const ReconstructionReport& report) {
     if (!first) text << "\n";
     if (report.limitedSamples > 0 || report.neighbourhoods > 0)
         text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
-             << " % of the light removed"
-             << (report.energyRemoved > kMuchLight ? " (WARNING: much; where few samples find the light, "
+             << " % of the light removed, " << 100 * report.energyReturned << " % given back"
+             << (report.energyRemoved - report.energyReturned > kMuchLight ? " (WARNING: much; where few samples find the light, "
                                                      "--fireflies keep keeps it)\n"
                                                    : "\n");
     if (report.neighbourhoods > 0)

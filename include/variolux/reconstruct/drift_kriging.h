@@ -34,16 +34,17 @@
 /// 5. *Models*: medium and strict, large and tolerant, small. Where few data are like the centre the medium
 ///    model keeps their noise: it is shrunk towards the small one by positive-part James-Stein, by how much
 ///    of their difference the pixel's own noise explains, (h1 - h3)+^2 sum over colours of v / n; h is what
-///    the pixel's datum weighs in its estimate (the diagonal of the hat matrix), averaged over neighbourhoods.
-///    Models and the pixel's plain mean are combined per pixel by stacking (Breiman 1996): convex weights that
-///    predict half B from half A and the reverse, fitted over about 20 x 20 pixels; the plain mean enters only
-///    where it improves by two standard errors.
+///    the pixel's datum weighs in its estimate (the diagonal of the hat matrix), averaged over
+///    neighbourhoods. Models and the pixel's plain mean are combined per pixel by stacking (Breiman 1996):
+///    convex weights that predict half B from half A and the reverse, fitted over about 20 x 20 pixels; the
+///    plain mean enters only where it improves by two standard errors.
 /// 6. *Half the resolution*: the same data, 2 x 2 pixels as one, are kriged by the same models, C. The
 ///    estimate K becomes K + w (L - K), L = K + up(C - down(K)), with the w in 0 to 1 by which each half's
 ///    correction predicts the other half's data best in 7 x 7 pixels (half_resolution.h). Noise of low
 ///    frequency, which neighbourhoods of a few pixels share, is less at half the resolution. Pictures of less
 ///    than 32 pixels along an axis have no such level.
-/// 7. *Outliers and light*: a pixel beyond the range of its eight neighbours moves towards them by how much of
+/// 7. *Outliers and light*: a pixel beyond the range of its eight neighbours moves towards them by how much
+/// of
 ///    the excess its own noise explains. What fireflies lost in the 33 x 33 pixels around is given back in
 ///    proportion to the light there, by how much of it is no accident of a few samples (finishing.h).
 /// 8. *Error map*: the estimator's own variance. The noise of the halves' common data is estimated twice, and
