@@ -136,8 +136,12 @@ void Correction::correctRow(int y) {
                                                          w * static_cast<double>(differences_.row(k, y)[x]));
         for (int c = 0; c < 3; ++c) {
             const double d = differences_.row(planes_.value() + c, y)[x];
+            const double ofFine = fine_.combined.row(planes_.variance() + c, y)[x];
+            const double ofCoarse =
+                std::min<double>(ofFine, coarse_.combined.row(planes_.variance() + c, y / 2)[x / 2]);
+            const double kept = (1 - w) * (1 - w);
             corrected_.row(planes_.variance() + c, y)[x] =
-                static_cast<float>(fine_.combined.row(planes_.variance() + c, y)[x] + w * (1 - w) * d * d);
+                static_cast<float>(kept * ofFine + (1 - kept) * ofCoarse + w * (1 - w) * d * d);
         }
         corrected_.row(planes_.leverage(), y)[x] = fine_.combined.row(planes_.leverage(), y)[x];
     }

@@ -37,8 +37,10 @@ class Correction {
     ///     w = (sum u (L_A - K_A)(Z_B - K_A) + (A and B exchanged) + l / 2)
     ///         / (sum u ((L_A - K_A)^2 + (L_B - K_B)^2) + l),
     /// u one over the variance of a half's mean, l = 10: a prior of one half, since evidence in a window is
-    /// too noisy to find the gain by itself, and strong enough to refuse it. Its variance grows by
-    /// w (1 - w) (L - K)^2. Differences of kReach rows around y are there.
+    /// too noisy to find the gain by itself, and strong enough to refuse it. Variance, where V_C is
+    /// what C says of its own and V_K what K does: (1 - w)^2 V_K + (1 - (1 - w)^2) min(V_C, V_K)
+    /// + w (1 - w) (L - K)^2: both krige the same data, so that the better one's error is what they share.
+    /// Differences of kReach rows around y are there.
     void correctRow(int y);
 
   private:

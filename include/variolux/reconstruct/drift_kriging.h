@@ -52,7 +52,7 @@
 ///    alike features; and by the kriging variance of the neighbourhoods, v (1 + p) / sum w (p effective
 ///    functions), less what they spread about their mean, which averaging takes off. That spread is added, as
 ///    what the drift does not say, and so is what a model differs from the combination by beyond its own
-///    variance, and w (1 - w) (L - K)^2.
+///    variance; half the resolution mixes its own in by w, where that is less, and adds w (1 - w) (L - K)^2.
 /// 9. *What samples do not say*: no pixel is exact but where the dump states an error variance of 0, there
 ///    and at all pixels that it was pooled over. Where not two of the n samples around a pixel differ, what
 ///    they did not see has a probability of up to 3 / n (95 % confidence): the variance of a sample is 3 / n
