@@ -145,10 +145,11 @@ void Finishing::lightRow(int y) {
 
 /// By what share R, G, B and all of them grow, pixel by pixel of row y, so that what fireflies lost around is
 /// given back in proportion to the light there, by how much of it is no accident of a few samples:
-/// (1 - sum r^2 / (sum r)^2)+.
+/// (1 - sum r^2 / (sum r)^2)+. Last, the variance of what was lost, sum r^2, as a share of the light's
+/// square.
 std::vector<double> Finishing::returned(int y) const {
     const auto w = static_cast<std::size_t>(width_);
-    std::vector<double> sums(kLightPlanes * w), shares(4 * w);
+    std::vector<double> sums(kLightPlanes * w), shares(5 * w);
     for (int row = std::max(0, y - kLightReach); row <= std::min(height_ - 1, y + kLightReach); ++row) {
         const double weight = (kLightReach + 1.0 - std::abs(row - y)) / (kLightReach + 1.0);
         for (int k = 0; k < kLightPlanes; ++k) {
@@ -168,7 +169,9 @@ std::vector<double> Finishing::returned(int y) const {
         for (std::size_t c = 0; c < 3; ++c)
             if (sums[(4 + c) * w + i] > 0)
                 shares[c * w + i] = known * sums[c * w + i] / sums[(4 + c) * w + i];
-        if (light > 0) shares[3 * w + i] = known * lost / light;
+        if (light <= 0) continue;
+        shares[3 * w + i] = known * lost / light;
+        shares[4 * w + i] = 3 * sums[3 * w + i] / (light * light);
     }
     return shares;
 }
@@ -206,6 +209,7 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             // the kriging variance: half of each.
             double variance =
                 shared[c] / 2 + static_cast<double>(combined_.row(combinedPlanes_.variance() + c, y)[x]);
+            variance += value * value * shares[static_cast<std::size_t>(4 * width_ + x)];
             if (gap > 0) variance += picture_.semivarianceAt(c, gap / scale_);
             const double meanVariance = static_cast<double>(variances_.row(c, y)[x]) / std::max(1.0, n);
             out[radiance_ + c] = static_cast<float>(
