@@ -60,7 +60,7 @@ void bind(CLI::App& app, Options& options) {
         ->group(output);
     app.add_option("--exposure", options.exposure,
                    "Stops by which pictures are brightened (-32 to 32); metrics are not affected")
-        ->check(CLI::Range(-32.0, 32.0))
+        ->check(finiteWithin(-32, 32))
         ->option_text("EV")
         ->needs("--pictures")
         ->group(output);

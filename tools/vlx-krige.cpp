@@ -104,10 +104,10 @@ void bind(CLI::App& app, Options& o) {
         "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
         "What was removed is reported");
     app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
-        ->check(CLI::PositiveNumber)
+        ->check(vlx::finitePositive())
         ->capture_default_str();
     app.add_option("--strength", o.krige.strength, "krige: 0 keeps the plain average, 1 takes the estimate")
-        ->check(CLI::Range(0.0, 1.0))
+        ->check(vlx::finiteWithin(0, 1))
         ->capture_default_str();
     app.add_option(
         "--feature", o.krige.features,
@@ -148,7 +148,7 @@ void bind(CLI::App& app, Options& o) {
         ->option_text("IMAGE");
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
     app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
-        ->check(CLI::PositiveNumber)
+        ->check(vlx::finitePositive())
         ->capture_default_str();
     auto* region = app.add_option("--region", o.paper.regionSize, "paper: side of a region in pixels")
                        ->check(CLI::Range(1, 64))
