@@ -268,16 +268,11 @@ struct TraceCommand {
             if (!overwrite && vlx::isFinished({dump}, options.inputs)) return skip();
         }
         if (listCameras) return printCameras(loadCameras(scene, exposure));
-        Scene loaded = loadScene(scene, environment, exposure);
-        options.camera = chosenCamera(loaded);
+        options.version = VARIOLUX_VERSION;
         std::optional<EarlierDump> earlier;
         if (!earlierPath.empty()) takeSizeOf(earlier.emplace(earlierPath));
-        setSize(loaded.cameras[options.camera]);
-        if (integrator == IntegratorRequest::Bidirectional && targetError > 0)
-            throw CLI::ValidationError("--target-error", "judges by path tracing: not with bidirectional");
-        if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
-        options.version = VARIOLUX_VERSION;
-        if (const auto fault = options.validate(loaded)) throw CLI::ValidationError(*fault);
+        chooseView(loadCameras(scene, exposure));
+        Scene loaded = loadScene(scene, environment, exposure);
         for (const std::string& warning : loaded.report.warnings) note("warning: " + warning);
         if (loaded.report.degenerateTriangles > 0)
             note(std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");
@@ -390,6 +385,16 @@ struct TraceCommand {
                         plan.features.reason.c_str());
         std::printf("integrator %s: %s\n", std::string(nameOf(choice.chosen)).c_str(), choice.reason.c_str());
         return vlx::kDone;
+    }
+
+    /// Camera and picture, by the scene's cameras alone: what is wrong with them is told before the scene is
+    /// read. Without a camera that can be used nothing is chosen: reading the scene says why.
+    void chooseView(const Scene& known) {
+        if (std::ranges::all_of(known.cameras, [](const Camera& c) { return !c.unusable.empty(); })) return;
+        options.camera = chosenCamera(known);
+        setSize(known.cameras[options.camera]);
+        if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
+        if (const auto fault = options.validate(known)) throw CLI::ValidationError(*fault);
     }
 
     std::size_t chosenCamera(const Scene& loaded) const {
