@@ -88,7 +88,8 @@ void bind(CLI::App& app, Options& o) {
          {"mean", Method::Mean},
          {"gaussian", Method::Gaussian}},
         "krige: kriging with the features as external drift, in overlapping neighbourhoods; paper: "
-        "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples; "
+        "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples, its stddev the "
+        "plain standard error, 0 where they agree; "
         "gaussian: the average, Gaussian filtered (no layer stddev)");
     vlx::addChoice(
         app, "--quality", o.krige.quality,
