@@ -29,6 +29,7 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
         {"exactPixels", report.exactPixels},
         {"regions", regions},
         {"jitteredSystems", report.jitteredSystems},
+        {"inaccuratePixels", report.inaccuratePixels},
         {"neighbourhoods", report.neighbourhoods},
         {"ownNeighbourhoods", report.ownNeighbourhoods},
         {"failedNeighbourhoods", report.failedNeighbourhoods},
@@ -163,6 +164,8 @@ std::string toText(const ReconstructionReport& report) {
     if (report.failedNeighbourhoods > 0)
         text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
     if (report.jitteredSystems > 0) text << report.jitteredSystems << " systems needed jitter\n";
+    if (report.inaccuratePixels > 0)
+        text << report.inaccuratePixels << " pixels of ill-conditioned systems may be off by rounding\n";
     return text.str();
 }
 
@@ -187,7 +190,8 @@ std::string toJson(const Reconstruction& reconstruction) {
                            {"errorVariance", r.errorVariance},
                            {"colourScale", r.colourScale},
                            {"condition", r.condition},
-                           {"jitter", r.jitter}});
+                           {"jitter", r.jitter},
+                           {"inaccurate", r.inaccurate}});
         if (const auto found = reconstruction.inspections.find(i); found != reconstruction.inspections.end())
             regions.back()["inspection"] = json(found->second);
     }
