@@ -138,7 +138,9 @@ constexpr double kMuchLight = 0.1;
 std::string toText(const ReconstructionReport& report) {
     std::ostringstream text;
     text << report.samples << " samples";
-    if (report.droppedSamples > 0) text << ", " << report.droppedSamples << " dropped (non-finite)";
+    if (report.droppedSamples > 0)
+        text << ", " << report.droppedSamples
+             << (report.neighbourhoods > 0 ? " dropped (non-finite, or beyond 10^15)" : " dropped (non-finite)");
     if (report.emptyPixels > 0) text << ", " << report.emptyPixels << " pixels without samples";
     if (report.farPixels > 0) text << " (" << report.farPixels << " of them more than 5 pixels from any)";
     if (report.exactPixels > 0) text << ", " << report.exactPixels << " pixels kept: their stated error is 0";

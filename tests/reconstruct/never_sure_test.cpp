@@ -344,6 +344,32 @@ TEST(NeverSure, AWildFeatureValueCostsItsPixelOnly) {
     }
 }
 
+// Squares of radiance beyond 1e19 are no floats: such samples are dropped as if they were not finite.
+TEST(NeverSure, RadianceBeyondAllLightCostsItsSamplesOnly) {
+    for (const float wild : {1e14f, 2e15f, 1e19f, 1e30f, 3e38f, -1e30f})
+        for (const bool stated : {false, true})
+            for (const Fireflies fireflies : {Fireflies::Keep, Fireflies::Robust}) {
+                std::vector<std::string> channels = {"R", "G", "B"};
+                if (stated) channels.insert(channels.end(), {"variance.R", "variance.G", "variance.B"});
+                const SampleBuffer dump =
+                    picture(24, channels, 5, [&](int x, int y, Random& random, auto& samples) {
+                        std::normal_distribution<float> noise(0.5f, 0.05f);
+                        for (int s = 0; s < 4; ++s) {
+                            const float z = x == 12 && y == 12 && s < 2 ? wild : noise(random);
+                            samples.push_back({z, noise(random), noise(random)});
+                            if (stated) samples.back().resize(6, std::abs(z) > 1 ? std::abs(wild) : 0.0025f);
+                        }
+                    });
+                const Reconstruction result = reconstructDriftKriging(dump, {.fireflies = fireflies});
+                for (const float value : result.image.pixels) ASSERT_TRUE(std::isfinite(value)) << wild;
+                EXPECT_GT(least(result.image, "stddev.R"), 0) << wild;
+                EXPECT_EQ(result.report.droppedSamples, wild == 1e14f ? 0 : 2) << wild;
+                if (wild == 1e14f) continue;
+                EXPECT_NEAR(result.image.at(12, 12)[0], 0.5, 0.2) << wild;
+                EXPECT_NE(toText(result.report).find("beyond 10^15"), std::string::npos);
+            }
+}
+
 // A background at an unlimited depth is no reason to forget what depth says elsewhere.
 TEST(NeverSure, AFarBackgroundLeavesDepthItsUse) {
     const auto sky = [](int, int y) { return y < 14; };
