@@ -67,7 +67,7 @@ struct SweepCommand {
         app.add_option("--hierarchical", o.tolerances,
                        "Also sample the scene hierarchically, to these tolerances")
             ->delimiter(',')
-            ->check(CLI::NonNegativeNumber)
+            ->check(finiteNonNegative())
             ->option_text("T,T,...")
             ->group(sampling);
         app.add_option("--width", o.width,
@@ -84,7 +84,7 @@ struct SweepCommand {
             ->group(sampling);
         app.add_option("--trace-seconds", o.traceSeconds,
                        "Seconds that the renderer took for the whole dump, if the dump does not say")
-            ->check(CLI::PositiveNumber)
+            ->check(finitePositive())
             ->option_text("S")
             ->group(sampling);
         app.add_flag("--keep-dumps", o.keepDumps, "Keep the dumps in FOLDER/scratch")->group(sampling);

@@ -19,8 +19,10 @@ namespace {
 // Options that change no pixel, and those that are counted in another way.
 const std::set<std::string>& notCounted() {
     static const std::set<std::string> names = {
-        "--help",    "--help-man",   "--completion", "--version", "--log",          "--quiet", "--json",
-        "--threads", "--max-memory", "--overwrite",  "--output",  "--sampling-map", "--band",  "--frames"};
+        "--help",       "--help-man",     "--completion", "--version",         "--log",
+        "--quiet",      "--json",         "--threads",    "--max-memory",      "--overwrite",
+        "--output",     "--sampling-map", "--band",       "--frames",          "--pictures",
+        "--fail-above", "--fail-below",   "--stddev",     "--reference-stddev"};
     return names;
 }
 
@@ -108,7 +110,8 @@ bool isFinished(const std::vector<std::string>& outputs, const std::string& inpu
     std::error_code ignored;
     for (const std::string& output : outputs) {
         if (!std::filesystem::is_regular_file(output, ignored)) return false;
-        if (output.ends_with(".exr") && readTextAttribute(output, kInputsAttribute) != inputs) return false;
+        const bool says = output.ends_with(".exr") || output.ends_with(".png");
+        if (says && readTextAttribute(output, kInputsAttribute) != inputs) return false;
     }
     say(outputs.front() + ": is finished (same inputs and parameters), skipped; --overwrite makes it again");
     return true;

@@ -45,7 +45,7 @@ class InputsHash {
     std::vector<File> files_;
 };
 
-/// Whether all `outputs` are there, and those that are EXR images say that they are made of `inputs`. If so,
+/// Whether all `outputs` are there, and those that are images say that they are made of `inputs`. If so,
 /// it is said on standard error, unless the run is quiet.
 bool isFinished(const std::vector<std::string>& outputs, const std::string& inputs);
 

@@ -33,7 +33,7 @@ void bindCompanions(CLI::App& app, CompanionImages& with) {
 
 void bindSamples(CLI::App& app, double& samples) {
     app.add_option("--samples", samples, "Samples a pixel, where the variance is of single ones")
-        ->check(CLI::Range(1.0, 1e9));
+        ->check(finiteWithin(1, 1e9));
 }
 
 void MomentFlags::bind(CLI::App& app, const std::string& group) {

@@ -11,6 +11,7 @@
 #include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "completion.h"
 #include "help_formatter.h"
@@ -137,6 +138,16 @@ void addCommonOptions(CLI::App& app, LogFormat& format) {
     app.footer(footer + (footer.empty() ? "" : "\n\n") + wrapped(kExitCodes, 80));
 }
 
+CLI::Validator finite(const std::string& expected, const std::string& description,
+                      const std::function<bool(double)>& within) {
+    const auto check = [expected, within](const std::string& text) {
+        double value = 0;
+        const bool valid = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && within(value);
+        return valid ? std::string() : "expected " + expected + ", found '" + text + "'";
+    };
+    return {check, description};
+}
+
 void setFormatter(CLI::App& app, const std::shared_ptr<CLI::FormatterBase>& formatter) {
     app.formatter(formatter);
     for (CLI::App* const command : app.get_subcommands([](CLI::App*) { return true; }))
@@ -192,6 +203,21 @@ void warn(const std::string& text) {
         printRecord({{"event", "message"}, {"message", text}});
     else
         std::fprintf(stderr, "%s\n", printable(text).c_str());
+}
+
+CLI::Validator finiteWithin(double low, double high) {
+    std::ostringstream range, description;
+    range << "a number of " << low << " to " << high;
+    description << "FLOAT in [" << low << " - " << high << "]";
+    return finite(range.str(), description.str(), [=](double x) { return low <= x && x <= high; });
+}
+
+CLI::Validator finitePositive() {
+    return finite("a finite number above 0", "POSITIVE", [](double x) { return x > 0; });
+}
+
+CLI::Validator finiteNonNegative() {
+    return finite("a finite number, 0 or above", "NONNEGATIVE", [](double x) { return x >= 0; });
 }
 
 void checkOutputs(const std::vector<NamedFile>& outputs, const std::vector<std::string>& inputs) {

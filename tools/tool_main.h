@@ -41,6 +41,12 @@ void warn(const std::string& text);
 /// Whether --quiet was given: a tool then prints errors and what its other options ask for, nothing else.
 bool isQuiet();
 
+/// For check() of options whose value is a real number: only finite ones of the range pass (NaN passes
+/// CLI11's own checks). Bad usage says what was expected and found.
+CLI::Validator finiteWithin(double low, double high);
+CLI::Validator finitePositive();
+CLI::Validator finiteNonNegative();
+
 /// A file, and the option or what else it is named by.
 struct NamedFile {
     std::string option;

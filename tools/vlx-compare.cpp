@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "compare_sweep.h"
+#include "finished.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
@@ -33,9 +34,12 @@ struct Options {
     std::vector<std::string> crops;
     double exposure = 0;
     int threads = 0;
+    bool overwrite = false;
+    const CLI::App* commandLine = nullptr;
 };
 
 void bind(CLI::App& app, Options& options) {
+    options.commandLine = &app;
     app.add_option("REFERENCE", options.reference, "The image to measure against")->required();
     app.add_option("IMAGE", options.images, "Images to measure; data windows must equal the reference's")
         ->required();
@@ -60,8 +64,16 @@ void bind(CLI::App& app, Options& options) {
         ->group(output);
     app.add_option("--exposure", options.exposure,
                    "Stops by which pictures are brightened (-32 to 32); metrics are not affected")
-        ->check(CLI::Range(-32.0, 32.0))
+        ->check(finiteWithin(-32, 32))
         ->option_text("EV")
+        ->needs("--pictures")
+        ->group(output);
+    addOverwrite(app, options.overwrite);
+    app.get_option("--overwrite")
+        ->description(
+            "Write the pictures even if they are there and were made by this very program from the same "
+            "images "
+            "with the same parameters, which is else left out")
         ->needs("--pictures")
         ->group(output);
 
@@ -153,8 +165,27 @@ Input readInput(const std::string& path, const Options& options, bool wantStddev
     return input;
 }
 
+std::vector<std::string> pictureFiles(const Options& options) {
+    std::vector<std::string> files;
+    for (const char* name : {"side_by_side", "signed_error", "relative_error", "crops"})
+        if (std::string_view(name) != "crops" || !options.crops.empty())
+            files.push_back((std::filesystem::path(options.pictures) / name).string() + ".png");
+    return files;
+}
+
+/// Of all that the pictures are made of: images, and how they are called.
+InputsHash pictureInputs(const Options& options, const std::vector<std::string>& names) {
+    InputsHash hash(*options.commandLine, {"REFERENCE", "IMAGE"});
+    hash.addFile(options.reference);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        hash.add("name", names[i]);
+        hash.addFile(options.images[i]);
+    }
+    return hash;
+}
+
 void writePictures(const Options& options, const PictureOptions& picture, const Input& reference,
-                   const std::vector<Input>& inputs, const Report& report) {
+                   const std::vector<Input>& inputs, const Report& report, const InputsHash& hash) {
     std::vector<CaptionedImage> images;
     for (std::size_t i = 0; i < inputs.size(); ++i) {
         std::array<char, 48> note{};
@@ -165,17 +196,18 @@ void writePictures(const Options& options, const PictureOptions& picture, const 
     all.insert(all.begin(), CaptionedImage{"reference", "", reference.colour});
 
     // All are drawn before the first is written: what fails here leaves nothing behind.
-    std::vector<std::pair<std::string, Image>> files;
-    files.emplace_back("side_by_side.png", sideBySide(all, picture));
-    if (!picture.crops.empty()) files.emplace_back("crops.png", enlargedCrops(all, picture));
-    files.emplace_back("signed_error.png", signedErrors(reference.colour, images, picture));
-    files.emplace_back("relative_error.png", relativeErrors(reference.colour, images));
+    std::vector<Image> pictures = {sideBySide(all, picture), signedErrors(reference.colour, images, picture),
+                                   relativeErrors(reference.colour, images)};
+    if (!picture.crops.empty()) pictures.push_back(enlargedCrops(all, picture));
 
-    const std::filesystem::path folder(options.pictures);
+    hash.checkUnchanged();
     std::error_code status;
-    std::filesystem::create_directories(folder, status);
+    std::filesystem::create_directories(options.pictures, status);
     if (status) throw Error(options.pictures, "expected to make this folder: " + status.message());
-    for (const auto& [name, image] : files) writeImage((folder / name).string(), image);
+    const std::vector<std::string> files = pictureFiles(options);
+    ImageWriteOptions write;
+    write.attributes[kInputsAttribute] = hash.text();
+    for (std::size_t i = 0; i < files.size(); ++i) writeImage(files[i], pictures[i], write);
 }
 
 int run(const Options& options) {
@@ -190,20 +222,25 @@ int run(const Options& options) {
         picture.crops.push_back(parsed("--crop", [&] { return parseCrop(text); }));
     if (!options.pictures.empty()) {
         std::vector<NamedFile> pictures;
-        for (const char* name : {"side_by_side", "crops", "signed_error", "relative_error"})
-            pictures.push_back({"--pictures", options.pictures + "/" + name + ".png"});
+        for (const std::string& file : pictureFiles(options)) pictures.push_back({"--pictures", file});
         std::vector<std::string> inputs = options.images;
         inputs.push_back(options.reference);
         checkOutputs(pictures, inputs);
     }
     const ThreadLimit threads(options.threads);
 
+    const std::vector<std::string> names = shortNames(options.images);
+    std::optional<InputsHash> hash;  // of the pictures that are to be made
+    if (!options.pictures.empty()) {
+        hash = pictureInputs(options, names);
+        if (!options.overwrite && isFinished(pictureFiles(options), hash->text())) hash.reset();
+    }
+
     const Input reference = readInput(options.reference, options, options.referenceStddev);
     if (options.referenceStddev && !reference.stddev)
         throw Error(options.reference, "expected channels stddev.R, stddev.G, stddev.B, found none");
     bool layerFound = reference.layerFound;
     bool stddevFound = false;
-    const std::vector<std::string> names = shortNames(options.images);
     Report report{options.reference, reference.channels, reference.colour.data, {}, {}};
     std::vector<Input> inputs;
     for (std::size_t i = 0; i < options.images.size(); ++i) {
@@ -219,7 +256,7 @@ int run(const Options& options) {
         report.images.push_back(std::move(entry));
         layerFound = layerFound || input.layerFound;
         stddevFound = stddevFound || input.stddev;
-        if (!options.pictures.empty()) inputs.push_back(std::move(input));
+        if (hash) inputs.push_back(std::move(input));
     }
     if (!options.layer.empty() && !layerFound)
         throw Error(options.layer, "expected a layer of this name in at least one file, found none");
@@ -227,7 +264,7 @@ int run(const Options& options) {
         throw Error("--stddev", "expected an image with channels stddev.R, stddev.G, stddev.B, found none");
     report.violations = checkLimits(report, limits);
 
-    if (!options.pictures.empty()) writePictures(options, picture, reference, inputs, report);
+    if (hash) writePictures(options, picture, reference, inputs, report, *hash);
     if (options.json || !isQuiet())
         std::fputs((options.json ? toJson(report) : toText(report)).c_str(), stdout);
     if (report.violations.empty()) return kDone;

@@ -88,7 +88,8 @@ void bind(CLI::App& app, Options& o) {
          {"mean", Method::Mean},
          {"gaussian", Method::Gaussian}},
         "krige: kriging with the features as external drift, in overlapping neighbourhoods; paper: "
-        "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples; "
+        "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples, its stddev the "
+        "plain standard error, 0 where they agree; "
         "gaussian: the average, Gaussian filtered (no layer stddev)");
     vlx::addChoice(
         app, "--quality", o.krige.quality,
@@ -104,10 +105,10 @@ void bind(CLI::App& app, Options& o) {
         "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
         "What was removed is reported");
     app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
-        ->check(CLI::PositiveNumber)
+        ->check(vlx::finitePositive())
         ->capture_default_str();
     app.add_option("--strength", o.krige.strength, "krige: 0 keeps the plain average, 1 takes the estimate")
-        ->check(CLI::Range(0.0, 1.0))
+        ->check(vlx::finiteWithin(0, 1))
         ->capture_default_str();
     app.add_option(
         "--feature", o.krige.features,
@@ -148,7 +149,7 @@ void bind(CLI::App& app, Options& o) {
         ->option_text("IMAGE");
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
     app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
-        ->check(CLI::PositiveNumber)
+        ->check(vlx::finitePositive())
         ->capture_default_str();
     auto* region = app.add_option("--region", o.paper.regionSize, "paper: side of a region in pixels")
                        ->check(CLI::Range(1, 64))

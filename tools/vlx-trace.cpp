@@ -93,20 +93,20 @@ struct TraceCommand {
                        "Hierarchical: the relative standard error of a pixel at which its cells are\n"
                        "no longer refined; 0 takes all 256 samples. Large values darken the image:\n"
                        "cells that have not met rare bright paths stop early")
-            ->check(CLI::NonNegativeNumber)
+            ->check(vlx::finiteNonNegative())
             ->needs(hierarchical)
             ->capture_default_str();
         auto* time = app.add_option("--time", timeLimit,
                                     "Take as many samples a pixel as this many seconds of tracing allow,\n"
                                     "judged by a short pilot")
-                         ->check(CLI::PositiveNumber)
+                         ->check(vlx::finitePositive())
                          ->excludes(spp)
                          ->excludes(hierarchical)
                          ->type_name("SECONDS");
         app.add_option("--target-error", targetError,
                        "Take as many samples a pixel as bring the relMSE of the plain average down to\n"
                        "this, judged by a short pilot (before reconstruction)")
-            ->check(CLI::PositiveNumber)
+            ->check(vlx::finitePositive())
             ->excludes(spp)
             ->excludes(hierarchical)
             ->excludes(time)
@@ -124,7 +124,7 @@ struct TraceCommand {
         app.add_option("--replicates", options.replicates,
                        "Divide the samples of each pixel into this many independent randomisations\n"
                        "(written as sample.replicate)")
-            ->check(CLI::PositiveNumber)
+            ->check(CLI::Range(1, 1 << 24))
             ->excludes(hierarchical)
             ->capture_default_str();
         app.add_option("--seed", options.seed, "Another seed, other noise")->capture_default_str();
@@ -135,7 +135,7 @@ struct TraceCommand {
                                         "Radiance from all around, in place of the scene's own environment")
                              ->delimiter(',')
                              ->expected(3)
-                             ->check(CLI::NonNegativeNumber)
+                             ->check(vlx::finiteNonNegative())
                              ->type_name("R,G,B");
         app.add_option("--env", environment.image,
                        "Latitude-longitude image of the environment (EXR, HDR, ...); its middle is -z")
@@ -180,7 +180,7 @@ struct TraceCommand {
                 ->excludes("--explain")
                 ->type_name("LIST");
         app.add_option("--fps", framesPerSecond, "Frames a second of the scene's animations")
-            ->check(CLI::PositiveNumber)
+            ->check(vlx::finiteWithin(1e-6, 1e6))
             ->needs(sequence)
             ->capture_default_str();
         vlx::addOverwrite(app, overwrite);
@@ -222,6 +222,14 @@ struct TraceCommand {
                "--max-bounces", "--effects", "--integrator", "--explain"},
               {trace, explaining}}},
             {atHand});
+        if (shutter.size() == 2 &&
+            !(std::isfinite(shutter[0]) && std::isfinite(shutter[1]) && shutter[0] <= shutter[1]))
+            throw CLI::ValidationError("--shutter",
+                                       "expected two finite times, the second not before the first");
+        for (const float value : environmentConstant)
+            if (!std::isfinite(value)) throw CLI::ValidationError("--env-constant", "expected finite values");
+        if (integrator == IntegratorRequest::Bidirectional && targetError > 0)
+            throw CLI::ValidationError("--target-error", "judges by path tracing: not with bidirectional");
     }
 
     TraceCommand ofFrame(int number) const {
@@ -247,15 +255,10 @@ struct TraceCommand {
         if (!request) throw CLI::ValidationError("--effects", broken);
         Shutter exposure;
         if (shutter.size() == 2) exposure = {shutter[0], shutter[1]};
-        if (!std::isfinite(exposure.open) || !std::isfinite(exposure.close) || exposure.close < exposure.open)
-            throw CLI::ValidationError("--shutter",
-                                       "expected two finite times, the second not before the first");
         if (frame) {
             exposure.open += *frame / framesPerSecond;
             exposure.close += *frame / framesPerSecond;
         }
-        for (const float value : environmentConstant)
-            if (!std::isfinite(value)) throw CLI::ValidationError("--env-constant", "expected finite values");
         if (environmentConstant.size() == 3)
             environment.constant =
                 Rgb{environmentConstant[0], environmentConstant[1], environmentConstant[2]};
@@ -265,16 +268,11 @@ struct TraceCommand {
             if (!overwrite && vlx::isFinished({dump}, options.inputs)) return skip();
         }
         if (listCameras) return printCameras(loadCameras(scene, exposure));
-        Scene loaded = loadScene(scene, environment, exposure);
-        options.camera = chosenCamera(loaded);
+        options.version = VARIOLUX_VERSION;
         std::optional<EarlierDump> earlier;
         if (!earlierPath.empty()) takeSizeOf(earlier.emplace(earlierPath));
-        setSize(loaded.cameras[options.camera]);
-        if (integrator == IntegratorRequest::Bidirectional && targetError > 0)
-            throw CLI::ValidationError("--target-error", "judges by path tracing: not with bidirectional");
-        if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
-        options.version = VARIOLUX_VERSION;
-        if (const auto fault = options.validate(loaded)) throw CLI::ValidationError(*fault);
+        chooseView(loadCameras(scene, exposure));
+        Scene loaded = loadScene(scene, environment, exposure);
         for (const std::string& warning : loaded.report.warnings) note("warning: " + warning);
         if (loaded.report.degenerateTriangles > 0)
             note(std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");
@@ -387,6 +385,16 @@ struct TraceCommand {
                         plan.features.reason.c_str());
         std::printf("integrator %s: %s\n", std::string(nameOf(choice.chosen)).c_str(), choice.reason.c_str());
         return vlx::kDone;
+    }
+
+    /// Camera and picture, by the scene's cameras alone: what is wrong with them is told before the scene is
+    /// read. Without a camera that can be used nothing is chosen: reading the scene says why.
+    void chooseView(const Scene& known) {
+        if (std::ranges::all_of(known.cameras, [](const Camera& c) { return !c.unusable.empty(); })) return;
+        options.camera = chosenCamera(known);
+        setSize(known.cameras[options.camera]);
+        if (crop.size() == 4) options.crop = vlx::Window{crop[0], crop[1], crop[2], crop[3]};
+        if (const auto fault = options.validate(known)) throw CLI::ValidationError(*fault);
     }
 
     std::size_t chosenCamera(const Scene& loaded) const {

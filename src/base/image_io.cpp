@@ -2,11 +2,15 @@
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <openexr.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <memory>
+#include <type_traits>
 
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
@@ -22,14 +26,73 @@ std::string oiioError(const std::string& own) {
     return text.empty() ? "unknown reason" : text;
 }
 
+/// Throws Error when an image is larger than this program takes, or than the file can hold: a small file
+/// holds no huge image, whatever its header says. zlib makes at most 1032 bytes of one, of an area of one
+/// colour lossy compressions many more.
+void checkSize(const std::string& path, int width, int height, int channels, bool lossy) {
+    const double values = static_cast<double>(width) * height * channels;
+    const auto bytes = static_cast<double>(std::filesystem::file_size(path));
+    const std::string found = std::to_string(width) + " x " + std::to_string(height) + " pixels of " +
+                              std::to_string(channels) + " channels";
+    if (values > bytes * (lossy ? 1 << 16 : 1 << 11) + (1 << 20))
+        throw Error(path, "truncated or damaged: its header claims " + found + ", more than the file's " +
+                              std::to_string(std::filesystem::file_size(path)) + " bytes can hold");
+    if (values > std::numeric_limits<std::int32_t>::max())
+        throw Error(path, "expected at most 2^31 values, found " + found);
+}
+
+/// Checks the sizes of the flat parts of an OpenEXR file by its headers alone: libraries take memory for the
+/// tables that headers claim, or say no more than that the file ends. Returns what is wrong with the headers
+/// themselves, or nothing, as of files of other formats.
+std::string checkExrHeaders(const std::string& path) {
+    std::array<unsigned char, 4> start{};
+    std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(start.data()), start.size());
+    if (start != std::array<unsigned char, 4>{0x76, 0x2f, 0x31, 0x01}) return {};
+
+    std::string fault;
+    exr_context_initializer_t how = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    how.user_data = &fault;
+    how.error_handler_fn = [](exr_const_context_t file, exr_result_t, const char* message) {
+        void* text = nullptr;
+        exr_get_user_data(file, &text);
+        if (text != nullptr) *static_cast<std::string*>(text) = message;
+    };
+    exr_context_t opened = nullptr;
+    if (exr_start_read(&opened, path.c_str(), &how) != EXR_ERR_SUCCESS) return fault;
+    const auto close = [](exr_context_t file) { exr_finish(&file); };
+    const std::unique_ptr<std::remove_pointer_t<exr_context_t>, decltype(close)> file(opened, close);
+    int parts = 0;
+    exr_get_count(file.get(), &parts);
+    for (int part = 0; part < parts; ++part) {
+        exr_storage_t storage{};
+        exr_compression_t compression{};
+        exr_attr_box2i_t window{};
+        const exr_attr_chlist_t* channels = nullptr;
+        if (exr_get_storage(file.get(), part, &storage) != EXR_ERR_SUCCESS ||
+            exr_get_compression(file.get(), part, &compression) != EXR_ERR_SUCCESS ||
+            exr_get_data_window(file.get(), part, &window) != EXR_ERR_SUCCESS ||
+            exr_get_channels(file.get(), part, &channels) != EXR_ERR_SUCCESS)
+            return fault;
+        if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) continue;
+        // Windows lie within 2^30 of 0, which was checked.
+        checkSize(path, window.max.x - window.min.x + 1, window.max.y - window.min.y + 1,
+                  channels->num_channels, compression >= EXR_COMPRESSION_DWAA);
+    }
+    return {};
+}
+
 }  // namespace
 
 Image readImage(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status))
         throw Error(path, "expected an image, found no such file");
+    const std::string fault = checkExrHeaders(path);
     const auto input = OIIO::ImageInput::open(path);
-    if (!input) throw Error(path, "expected an image: " + oiioError({}));
+    if (!input) {
+        const std::string said = oiioError({});
+        throw Error(path, "expected an image: " + (fault.empty() ? said : fault));
+    }
     int part = 0;
     while (input->spec().deep)
         if (!input->seek_subimage(++part, 0))
@@ -41,20 +104,11 @@ Image readImage(const std::string& path) {
                               std::to_string(spec.width) + " x " + std::to_string(spec.height) + " x " +
                               std::to_string(spec.depth) + ", " + std::to_string(spec.nchannels) +
                               " channels");
-    const auto values = static_cast<std::int64_t>(spec.image_pixels()) * spec.nchannels;
-    if (values > std::numeric_limits<std::int32_t>::max())
-        throw Error(path, "expected at most 2^31 values, found " + std::to_string(values));
-
-    // A small file cannot hold a huge image, whatever its header says. zlib makes at most 1032 bytes of one,
-    // of an area of one colour lossy compressions many more.
     const bool exr = std::string_view(input->format_name()) == "openexr";
     const bool lossy = !exr || std::string(spec.get_string_attribute("compression")).starts_with("dwa");
-    const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path, status));
-    const std::int64_t most = bytes * (lossy ? 1 << 16 : 1 << 11) + (1 << 20);
-    if (values > most)
-        throw Error(path, "truncated or damaged: its header claims " + std::to_string(values) +
-                              " values, more than the file's " + std::to_string(bytes) + " bytes can hold");
-    requireMemory(path, static_cast<std::uint64_t>(values) * sizeof(float), "an image held whole");
+    checkSize(path, spec.width, spec.height, spec.nchannels, lossy);
+    requireMemory(path, imageBytes(Window{0, 0, spec.width, spec.height}, spec.channelnames.size()),
+                  "an image held whole");
 
     Image image(Window{spec.x, spec.y, spec.width, spec.height}, spec.channelnames);
     image.display = Window{spec.full_x, spec.full_y, spec.full_width, spec.full_height};

@@ -31,7 +31,10 @@ ImportReport importBcdStatistics(const std::string& image, const std::string& co
     source.meaning = VarianceMeaning::OfSample;
     source.samples = options.samples;
     const auto colours = findTriple(images.channels(0), {""});
-    if (!colours) throw Error(image, "expected an image of R, G and B, found " + listed(images.channels(0)));
+    if (!colours)
+        throw Error(image,
+                    "expected an image of R, G and B, as BCD has them, found " + listed(images.channels(0)) +
+                        " (vlx-pack moments takes images of luminance, and names others: --map R=CHANNEL)");
     for (std::size_t c = 0; c < 3; ++c) {
         const std::string colour(1, "RGB"[c]);
         source.mean[c] = images.take(0, (*colours)[c]);

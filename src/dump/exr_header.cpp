@@ -403,7 +403,11 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
             std::string found;
             for (const auto& channel : header.dump.channels)
                 found += (found.empty() ? " " : ", ") + channel.name;
-            throw Error(path, "expected deep samples with channels R, G and B, found" + found);
+            throw Error(path, "expected deep samples with channels R, G and B, found" + found +
+                                  ". No option renames a dump's channels: write them so, luminance as all "
+                                  "three; or give flat images, of which luminance is taken as it is and "
+                                  "--map R=CHANNEL names others (several seeds: vlx-pack stack; with "
+                                  "variances: vlx-krige or vlx-pack moments)");
         }
     for (const auto& channel : header.dump.channels) header.bytesPerSample += valueBytes(channel.type);
     return header;

@@ -177,7 +177,9 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
                         "expected the variance of each pixel (variance.R, .G, .B, or a renderer's own "
                         "names), found " +
                             listed(names) +
-                            ". Name its channels (--map variance.R=CHANNEL ...) or its image "
+                            ". Name its channels (--map variance.R=CHANNEL, .G and .B likewise, of luminance "
+                            "one for all "
+                            "three) or its image "
                             "(--variance), or make a dump of images with several seeds (vlx-pack "
                             "stack) or of two half-buffers (vlx-pack buffers)");
 

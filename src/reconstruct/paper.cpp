@@ -20,7 +20,8 @@ constexpr int kColours = 3;        // R, G, B carry the variogram
 constexpr int kCellsPerPixel = 4;  // along each axis: 16 cells a pixel
 constexpr int kMinData = 3;        // a variogram needs two distances
 constexpr int kDistanceClasses = 12;
-constexpr double kMinExponent = 0.25;  // lower ones are a nugget in all but name
+constexpr double kAgreement = 1.0 / 1024;  // of radiance: half floats cannot tell such values apart
+constexpr double kMinExponent = 0.25;      // lower ones are a nugget in all but name
 
 /// The index of the pixel of the region that holds a position.
 int pixelOf(const Window& pixels, double x, double y) {
@@ -162,12 +163,29 @@ VariogramFit fitStableModel(const EmpiricalVariogram& variogram, bool nugget) {
     return fitVariogram(variogram, options);
 }
 
+/// RegionEstimate::agreed, of one pixel or of all, given the weights of the data (pixels x n).
+Eigen::MatrixXd agreedShare(const RegionData& data, const Eigen::MatrixXd& weights) {
+    const Eigen::MatrixXd share = weights.array().square().matrix() * data.counts.cwiseInverse().asDiagonal();
+    Eigen::MatrixXd agreed(weights.rows(), kColours);
+    for (int c = 0; c < kColours; ++c) {
+        const double level2 = data.means.col(c).squaredNorm() / data.size();
+        const Eigen::ArrayXd ofSample = data.errorVariances.col(c).array() * data.counts.array();
+        const double most = data.varianceKnown
+                                ? kAgreement * kAgreement * level2
+                                : unseenVariance(static_cast<double>(data.samples), std::sqrt(level2));
+        const Eigen::ArrayXd agree = (ofSample <= most).cast<double>();
+        agreed.col(c) = share * agree.matrix();
+    }
+    return agreed;
+}
+
 /// The region's arithmetic mean everywhere; its error from the samples' noise and what the data vary about
 /// it.
 void useMean(RegionEstimate& estimate, const RegionData& data, const Moments& moments,
              RegionOutcome outcome) {
     estimate.diagnostics.outcome = outcome;
     estimate.values.rowwise() = moments.mean;
+    estimate.agreed = agreedShare(data, moments.weights.transpose()).replicate(estimate.values.rows(), 1);
     const Eigen::RowVectorXd noise =
         moments.weights.array().square().matrix().transpose() * data.errorVariances;
     for (int c = 0; c < kColours; ++c) {
@@ -218,11 +236,14 @@ void doubt(const PictureScale& picture, RegionEstimate& estimate) {
     const RegionDiagnostics& of = estimate.diagnostics;
     for (int c = 0; c < kColours; ++c)
         for (Eigen::Index p = 0; p < estimate.stddev.rows(); ++p)
-            if (estimate.stddev(p, c) == 0)
+            if (of.outcome == RegionOutcome::Empty) {
+                estimate.stddev(p, c) = picture.unknownDeviation(c);
+            } else {
+                const double level = std::max(std::abs(estimate.values(p, c)), picture.level);
+                const double unseen = unseenVariance(static_cast<double>(of.samples), level);
                 estimate.stddev(p, c) =
-                    of.outcome == RegionOutcome::Empty
-                        ? picture.unknownDeviation(c)
-                        : picture.agreedDeviation(estimate.values(p, c), static_cast<double>(of.samples));
+                    std::sqrt(estimate.stddev(p, c) * estimate.stddev(p, c) + estimate.agreed(p, c) * unseen);
+            }
 }
 
 /// Pixels of a region without a usable sample.
@@ -248,6 +269,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, 
     RegionEstimate estimate;
     estimate.values = Eigen::MatrixXd::Zero(pixels, data.means.cols());
     estimate.stddev = Eigen::MatrixXd::Zero(pixels, data.means.cols());
+    estimate.agreed = Eigen::MatrixXd::Zero(pixels, kColours);
     RegionDiagnostics& diagnostics = estimate.diagnostics;
     diagnostics.pixels = data.pixels;
     diagnostics.data = data.size();
@@ -294,12 +316,11 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, 
         useMean(estimate, data, moments, RegionOutcome::NoStructure);
         return estimate;
     }
-    if (!data.varianceKnown && fit.model.nugget > 0) {
+    if (!data.varianceKnown && diagnostics.errorVariance == 0 && fit.model.nugget > 0) {
         // One sample a cell: what does not correlate with its neighbours is taken for noise.
         RegionData noisy = data;
         noisy.errorVariances.leftCols(kColours).rowwise() =
             (fit.model.nugget / spread * moments.spread).matrix().transpose();
-        noisy.varianceKnown = true;
         return krigeRegion(noisy, options, inspect);
     }
     diagnostics.nugget = fit.model.nugget;
@@ -322,7 +343,10 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, 
         return estimate;
     }
     diagnostics.outcome = RegionOutcome::Kriged;
+    diagnostics.inaccurate = static_cast<int>(
+        std::count(prediction.status.begin(), prediction.status.end(), TargetStatus::Inaccurate));
     estimate.values = prediction.estimate;
+    estimate.agreed = agreedShare(data, prediction.weights);
     colourErrors(estimate, data, moments, prediction);
     return estimate;
 }
@@ -367,6 +391,7 @@ Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& op
             result.report.droppedSamples += dropped[i];
             result.report.emptyPixels += empty[i];
             result.report.jitteredSystems += diagnostics[i].jitter > 0 ? 1 : 0;
+            result.report.inaccuratePixels += diagnostics[i].inaccurate;
             if (inspections[i]) result.inspections[result.regions.size() + i] = std::move(*inspections[i]);
         }
         result.regions.insert(result.regions.end(), diagnostics.begin(), diagnostics.end());

@@ -39,10 +39,15 @@ void requireChannel(const SampleSource& dump, const SampleLayout& layout, const 
             "channel '" + channel + "' is used already and cannot be named again by --feature or --radiance");
 }
 
-/// Whether the radiance of a sample is finite, its channels those from `first` on; alpha is none.
+/// Sums of squares of such radiances are finite floats still; no light is as bright.
+constexpr float kMostRadiance = 0x1p50f;
+
+/// Whether the radiance of a sample is finite and at most kMostRadiance, its channels those from `first` on;
+/// alpha is none.
 bool usable(const SampleBand& band, const SampleLayout& layout, std::size_t first, std::size_t sample) {
     for (int c = 0; c < layout.radiance; ++c)
-        if (c != layout.alpha && !std::isfinite(band.values[first + static_cast<std::size_t>(c)][sample]))
+        if (c != layout.alpha &&
+            !(std::abs(band.values[first + static_cast<std::size_t>(c)][sample]) <= kMostRadiance))
             return false;
     return true;
 }
@@ -92,7 +97,7 @@ bool varianceKnown(const SampleBand& band, const SampleLayout& layout,
     for (std::size_t c = 0; c < 3; ++c)
         for (const std::size_t s : samples) {
             const float v = band.values[static_cast<std::size_t>(layout.variance) + c][s];
-            if (!(v >= 0 && std::isfinite(v))) return false;
+            if (!(v >= 0 && v <= kMostRadiance * kMostRadiance)) return false;
         }
     return true;
 }

@@ -77,10 +77,10 @@ struct GatherCounts {
 /// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
 /// alike, and may lie on different sides of the pixel. Single samples belong to A and B by turns along a row,
 /// starting with A or B by turns from row to row: a chessboard where every pixel has one. Samples with known
-/// error variances (kVarianceChannels) stand for their own scatter. A sample with radiance that is not finite
-/// is dropped; other such values count as 0. Features are saturated(feature / scale), sample by sample. Sums
-/// run in double precision about the pixel's first sample. A `clamp` above 0 limits the luminance of each
-/// sample.
+/// error variances (kVarianceChannels) stand for their own scatter. A sample with radiance that is not
+/// finite, or beyond 2^50, whose squares floats do not hold, is dropped; other values that are not finite
+/// count as 0. Features are saturated(feature / scale), sample by sample. Sums run in double precision about
+/// the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
                        int bandRow, double clamp, RowRing& ring, int y);
 

@@ -30,6 +30,7 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
         {"exactPixels", report.exactPixels},
         {"regions", regions},
         {"jitteredSystems", report.jitteredSystems},
+        {"inaccuratePixels", report.inaccuratePixels},
         {"neighbourhoods", report.neighbourhoods},
         {"ownNeighbourhoods", report.ownNeighbourhoods},
         {"failedNeighbourhoods", report.failedNeighbourhoods},
@@ -138,7 +139,9 @@ constexpr double kMuchLight = 0.1;
 std::string toText(const ReconstructionReport& report) {
     std::ostringstream text;
     text << report.samples << " samples";
-    if (report.droppedSamples > 0) text << ", " << report.droppedSamples << " dropped (non-finite)";
+    if (report.droppedSamples > 0)
+        text << ", " << report.droppedSamples
+             << (report.neighbourhoods > 0 ? " dropped (non-finite, or beyond 10^15)" : " dropped (non-finite)");
     if (report.emptyPixels > 0) text << ", " << report.emptyPixels << " pixels without samples";
     if (report.farPixels > 0) text << " (" << report.farPixels << " of them more than 5 pixels from any)";
     if (report.exactPixels > 0) text << ", " << report.exactPixels << " pixels kept: their stated error is 0";
@@ -164,6 +167,8 @@ std::string toText(const ReconstructionReport& report) {
     if (report.failedNeighbourhoods > 0)
         text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
     if (report.jitteredSystems > 0) text << report.jitteredSystems << " systems needed jitter\n";
+    if (report.inaccuratePixels > 0)
+        text << report.inaccuratePixels << " pixels of ill-conditioned systems may be off by rounding\n";
     return text.str();
 }
 
@@ -188,7 +193,8 @@ std::string toJson(const Reconstruction& reconstruction) {
                            {"errorVariance", r.errorVariance},
                            {"colourScale", r.colourScale},
                            {"condition", r.condition},
-                           {"jitter", r.jitter}});
+                           {"jitter", r.jitter},
+                           {"inaccurate", r.inaccurate}});
         if (const auto found = reconstruction.inspections.find(i); found != reconstruction.inspections.end())
             regions.back()["inspection"] = json(found->second);
     }

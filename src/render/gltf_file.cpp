@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "gltf_check.h"
+#include "gltf_references.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {
@@ -31,6 +32,10 @@ std::uint32_t word(const std::vector<unsigned char>& bytes, std::size_t offset) 
     return v;
 }
 
+bool isBinary(const std::vector<unsigned char>& bytes) {
+    return bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
+}
+
 /// Whether the chunks of a binary glTF file lie inside it.
 void checkChunks(const std::string& path, const std::vector<unsigned char>& bytes) {
     const std::size_t size = bytes.size();
@@ -44,6 +49,29 @@ void checkChunks(const std::string& path, const std::vector<unsigned char>& byte
     const bool hasBinary = json + 20 + 8 <= length;
     if (json + 20 > length || (hasBinary && json + 28 + word(bytes, json + 20) > length))
         throw Error(path, "a chunk of the binary glTF file is longer than the file");
+}
+
+/// A text or binary glTF file with what the cameras of the file `path` need.
+std::vector<unsigned char> readCameras(const std::string& path) {
+    std::string text = camerasAlone(gltfJson(path));
+    if (text.empty()) return readBytes(path);  // which says what is wrong
+    // Its own buffer, when it has one, is the binary file's.
+    const bool buffered = text.find("\"buffers\"") != std::string::npos;
+    const std::vector<unsigned char> whole = buffered ? readBytes(path) : std::vector<unsigned char>();
+    if (!isBinary(whole)) return {text.begin(), text.end()};
+    checkChunks(path, whole);
+    text.resize((text.size() + 3) / 4 * 4, ' ');
+    const std::size_t rest = 20 + std::size_t{word(whole, 12)};
+    std::vector<unsigned char> bytes(whole.begin(), whole.begin() + 20);
+    const auto setWord = [&](std::size_t offset, std::size_t value) {
+        const auto v = static_cast<std::uint32_t>(value);
+        std::memcpy(bytes.data() + offset, &v, sizeof v);
+    };
+    setWord(8, 20 + text.size() + (word(whole, 8) - rest));
+    setWord(12, text.size());
+    bytes.insert(bytes.end(), text.begin(), text.end());
+    bytes.insert(bytes.end(), whole.begin() + static_cast<std::ptrdiff_t>(rest), whole.end());
+    return bytes;
 }
 
 /// Images of their own files are kept encoded; those in buffers are read from there when wanted.
@@ -85,8 +113,8 @@ double component(const unsigned char* bytes, int type, bool normalized) {
 
 }  // namespace
 
-GltfFile::GltfFile(const std::string& path) : path_(path) {
-    const std::vector<unsigned char> bytes = readBytes(path);
+GltfFile::GltfFile(const std::string& path, Use use) : path_(path) {
+    const std::vector<unsigned char> bytes = use == Use::Scene ? readBytes(path) : readCameras(path);
     tinygltf::TinyGLTF loader;
     loader.SetImageLoader(keepEncoded, nullptr);
     const std::size_t slash = path.find_last_of('/');
@@ -95,7 +123,7 @@ GltfFile::GltfFile(const std::string& path) : path_(path) {
     const auto* text = reinterpret_cast<const char*>(bytes.data());
     std::string errors, warnings;
     bool good = false;
-    if (size >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0) {
+    if (isBinary(bytes)) {
         checkChunks(path, bytes);
         zeroAspects_ = checkGltf(path, {text + 20, word(bytes, 12)});
         good = loader.LoadBinaryFromMemory(&model_, &errors, &warnings, bytes.data(), size, folder);

@@ -16,8 +16,11 @@ namespace vlx::render {
 /// are followed: tinygltf does neither.
 class GltfFile {
   public:
+    /// What is wanted of a file; the rest is not read, and may be broken.
+    enum class Use { Scene, Cameras };
+
     /// Parses the file and loads its buffers; images stay encoded.
-    explicit GltfFile(const std::string& path);
+    explicit GltfFile(const std::string& path, Use use = Use::Scene);
 
     const std::string& path() const { return path_; }
     const tinygltf::Model& model() const { return model_; }

@@ -9,4 +9,12 @@ namespace vlx::render {
 /// file itself if it is no glTF file.
 std::vector<std::string> gltfFiles(const std::string& path);
 
+/// The JSON of a text or binary glTF file, whose rest is not read; empty if there is no file that can be
+/// read.
+std::string gltfJson(const std::string& path);
+
+/// Of the JSON of a glTF file, what its cameras need: scenes, nodes with their places, cameras, and where
+/// animations move cameras, these with the buffers. Empty if the text is no JSON object.
+std::string camerasAlone(const std::string& json);
+
 }  // namespace vlx::render

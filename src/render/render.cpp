@@ -11,6 +11,7 @@
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/image_io.h"
+#include "variolux/base/memory.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/writer.h"
 
@@ -345,16 +346,23 @@ std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
         const bool inside = crop->width >= 1 && crop->height >= 1 && crop->x >= 0 && crop->y >= 0 &&
                             crop->x <= width - crop->width && crop->y <= height - crop->height;
         if (!inside)
-            return "the crop must lie inside the picture of " + std::to_string(width) + "x" +
-                   std::to_string(height);
+            return "expected a part inside the picture of " + std::to_string(width) + " x " +
+                   std::to_string(height) + " pixels, found --crop " + std::to_string(crop->x) + "," +
+                   std::to_string(crop->y) + "," + std::to_string(crop->width) + "," +
+                   std::to_string(crop->height);
     }
+    if (band.count < 1 || band.index < 0 || band.index >= band.count)
+        return "band must be one of 1 to its number of bands";
+    const Window part = bandOf(crop.value_or(Window{0, 0, width, height}), band);
+    if (constexpr std::int64_t kMostPixels = std::int64_t{1} << 32; part.pixels() > kMostPixels)
+        return "expected at most " + std::to_string(kMostPixels) + " pixels to trace, found " +
+               std::to_string(part.width) + " x " + std::to_string(part.height) +
+               ": give a smaller --width or --height, or a part with --crop or --band";
     if (camera >= scene.cameras.size())
         return "camera " + std::to_string(camera) + " does not exist, the scene has " +
                std::to_string(scene.cameras.size());
     const Camera& c = scene.cameras[camera];
     if (!c.unusable.empty()) return "camera '" + c.name + "' cannot be used: " + c.unusable;
-    if (band.count < 1 || band.index < 0 || band.index >= band.count)
-        return "band must be one of 1 to its number of bands";
     if (spp < 1 || spp > 1 << 24) return "spp must be 1 to 2^24";
     if (seed > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
         return "seed must be less than 2^63";
@@ -413,6 +421,12 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     int bandRows = kBandRows;
     while (bandRows > kRegionSize && bandRows * mostSpp * window.width > kBandSamples)
         bandRows -= kRegionSize;
+
+    const std::int64_t fewest = options.hierarchical ? 1 : options.spp;
+    requireMemory(path,
+                  static_cast<std::uint64_t>(fewest * window.width * std::min(window.height, kRegionSize)) *
+                      header.channels.size() * sizeof(float),
+                  "the samples of a row of regions: a smaller --width, --crop or --spp needs less");
 
     const int regionsAcross = (window.x + window.width - 1) / kRegionSize - window.x / kRegionSize + 1;
     const int regionsDown = (window.y + window.height - 1) / kRegionSize - window.y / kRegionSize + 1;

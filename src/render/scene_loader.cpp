@@ -46,8 +46,8 @@ Transform localTransform(const GltfFile& file, const tinygltf::Node& node, const
 
 class Loader {
   public:
-    Loader(const std::string& path, const Shutter& shutter)
-        : file_(path),
+    Loader(const std::string& path, const Shutter& shutter, GltfFile::Use use = GltfFile::Use::Scene)
+        : file_(path, use),
           model_(file_.model()),
           geometry_(file_, scene_),
           shutter_(shutter),
@@ -65,7 +65,8 @@ class Loader {
         readNodes(placed);
         readEnvironment(environment);
         if (const std::string fault = cameraFault(placed); !fault.empty()) file_.fail(fault);
-        if (scene_.shapes.empty() && !scene_.environment) file_.fail("has no triangles and no environment");
+        if (scene_.shapes.empty() && !scene_.environment)
+            file_.fail("has no triangles and no environment (give one with --env-constant or --env)");
         completeScene(scene_);
         const bool glows = std::ranges::any_of(
             scene_.shapes, [&](const Shape& shape) { return scene_.materials[shape.material].emissive(); });
@@ -363,7 +364,7 @@ Scene loadScene(const std::string& path, const EnvironmentOptions& environment, 
 }
 
 Scene loadCameras(const std::string& path, const Shutter& shutter) {
-    return Loader(path, shutter).loadCameras();
+    return Loader(path, shutter, GltfFile::Use::Cameras).loadCameras();
 }
 
 }  // namespace vlx::render

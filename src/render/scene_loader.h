@@ -30,7 +30,9 @@ struct EnvironmentOptions {
 Scene loadScene(const std::string& path, const EnvironmentOptions& environment = {},
                 const Shutter& shutter = {});
 
-/// The cameras of a scene alone, whatever else it lacks. Why none can be used is in the report's warnings.
+/// The cameras of a scene alone, as loadScene numbers them, whatever else it lacks or holds: no more of the
+/// file is read than they need, buffers where animations move them. Why none can be used is in the report's
+/// warnings.
 Scene loadCameras(const std::string& path, const Shutter& shutter = {});
 
 /// Derives what follows from a scene's geometry, materials and lights, which must be set: bounds, glass

@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -115,6 +116,48 @@ TEST(LinearToSrgb, MeetsTheStandardsValues) {
     EXPECT_EQ(linearToSrgb(2.0f), 1.0f);
     EXPECT_NEAR(linearToSrgb(0.0031308f), 0.04045f, 1e-5f);
     EXPECT_NEAR(linearToSrgb(0.214041f), 0.5f, 1e-5f);  // IEC 61966-2-1
+}
+
+// Headers alone tell: nothing is taken for what they claim.
+TEST(ImageIo, HugeWindowsAreToldWithTheirSize) {
+    const TemporaryFolder folder;
+    const std::string path = folder / "huge.exr";
+    writeImage(path, Image({0, 0, 4, 4}, {"R", "G", "B"}));
+    std::string bytes;
+    {
+        std::ifstream in(path, std::ios::binary);
+        bytes.assign(std::istreambuf_iterator<char>(in), {});
+    }
+    const auto messageOf = [](const std::string& file) {
+        try {
+            readImage(file);
+        } catch (const Error& error) {
+            return std::string(error.what());
+        }
+        return std::string("no error");
+    };
+    const auto messageOfWindow = [&](std::int32_t width, std::int32_t height) {
+        for (const std::string name : {"dataWindow", "displayWindow"}) {
+            const std::string attribute = name + std::string("\0box2i\0", 7);
+            const std::int32_t corner[2] = {width - 1, height - 1};
+            std::memcpy(bytes.data() + bytes.find(attribute) + attribute.size() + 12, corner, sizeof corner);
+        }
+        std::ofstream(path, std::ios::binary) << bytes;
+        return messageOf(path);
+    };
+    for (const auto& [width, height] :
+         {std::pair{1 << 29, 1 << 29}, {1 << 29, 2}, {2, 1 << 29}, {1 << 20, 1 << 20}}) {
+        const std::string message = messageOfWindow(width, height);
+        EXPECT_NE(
+            message.find("claims " + std::to_string(width) + " x " + std::to_string(height) + " pixels"),
+            std::string::npos)
+            << message;
+        EXPECT_NE(message.find("huge.exr: truncated or damaged"), std::string::npos) << message;
+    }
+    EXPECT_NE(messageOfWindow(1 << 30, 1 << 30).find("1073741823"), std::string::npos);
+    // Products that no 64 bits hold.
+    std::ofstream(folder / "huge.pfm") << "PF\n2147483647 2147483647\n-1\n";
+    EXPECT_NE(messageOf(folder / "huge.pfm").find("2147483647 x 2147483647 pixels"), std::string::npos);
 }
 
 }  // namespace

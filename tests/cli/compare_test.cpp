@@ -139,6 +139,40 @@ TEST_F(CompareTool, WritesPicturesWithCropsOnlyWhenAskedFor) {
     EXPECT_TRUE(fs::exists(out + "/crops.png"));
 }
 
+// As the other tools' outputs: what is finished is left alone, anything else is made anew.
+TEST_F(CompareTool, FinishedPicturesAreNotWrittenAgain) {
+    const std::string out = folder_ / "pictures";
+    const std::string picture = out + "/signed_error.png";
+    const auto write = [&](std::vector<std::string> more) {
+        std::vector<std::string> arguments = {ref_, good_, "--pictures", out};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        fs::last_write_time(picture, fs::file_time_type() + std::chrono::hours(1));
+        const auto before = fs::last_write_time(picture);
+        const ToolRun result = run(arguments);
+        EXPECT_EQ(result.exitCode, 0) << result.err;
+        EXPECT_NE(result.out.find("relMSE"), std::string::npos) << result.out;
+        EXPECT_EQ(result.err.find("is finished") == std::string::npos,
+                  fs::last_write_time(picture) != before);
+        return fs::last_write_time(picture) != before;
+    };
+    fs::create_directory(out);
+    std::ofstream(picture) << "something else";
+    EXPECT_TRUE(write({}));
+    EXPECT_FALSE(write({}));
+    EXPECT_FALSE(write({"--threads", "1", "--fail-above", "mse=9"})) << "they do not change the pictures";
+    EXPECT_TRUE(write({"--overwrite"}));
+    EXPECT_FALSE(write({}));
+    EXPECT_TRUE(write({"--exposure", "1"}));
+    EXPECT_TRUE(write({"--exposure", "1", "--crop", "10,20,8,8"})) << "crops.png is missing";
+    EXPECT_FALSE(write({"--exposure", "1", "--crop", "10,20,8,8"}));
+    EXPECT_TRUE(write({}));
+    fs::remove(out + "/side_by_side.png");
+    EXPECT_TRUE(write({}));
+    writeImage(good_, readImage(bad_));
+    EXPECT_TRUE(write({})) << "another image of this name";
+    EXPECT_EQ(run({ref_, good_, "--overwrite"}).exitCode, 2);
+}
+
 TEST_F(CompareTool, PicturesAreNotWrittenOverInputs) {
     const std::string input = folder_ / "signed_error.png";
     Image image({0, 0, 8, 8}, {"R", "G", "B"});

@@ -233,6 +233,12 @@ TEST_F(Input, MessagesNameTheOptionThatHelps) {
     ends({write("depth.exr", {"Z"})}, 1, "--map R=CHANNEL");
     ends({write("plain.exr", {"R", "G", "B"})}, 1, "--map variance.R=CHANNEL");
 
+    const std::string alone = write("alone.exr", {"Y"});
+    ends({alone}, 1, "--map variance.R=CHANNEL, .G and .B likewise, of luminance one for all three");
+    EXPECT_NE(
+        runTool("vlx-pack", {"bcd", alone, alone, "-o", folder / "bcd.exr"}).err.find("vlx-pack moments"),
+        std::string::npos);
+
     // Of one colour, by itself and with the mapping that was asked for.
     const std::string luminance = write("luminance.exr", {"Y", "variance.Y"});
     Arguments mapped = {luminance, "--variance-is", "mean"};

@@ -1,5 +1,5 @@
 // Every tool on files that are wrong: no crash, no hang, no more memory than they are worth, exit code 1, and
-// a message that names the file.
+// a message that names the file. And on numbers that are none: exit code 2, whatever the files.
 
 #include <gtest/gtest.h>
 
@@ -87,6 +87,56 @@ TEST_P(Malformed, FilesEndInAMessage) {
         std::filesystem::remove(path);
         std::filesystem::remove(folder / "out.exr");
     }
+}
+
+TEST(NumbersThatAreNotFinite, AreBadUsageOfEveryOption) {
+    struct Numbers {
+        std::string tool;
+        std::vector<std::string> before;
+        std::vector<std::string> options;
+        std::string form = "#";  // of the value: # is the number
+    };
+    const std::vector<std::string> in = {"none.exr", "-o", "out.exr"}, scene = {"none.glb", "-o", "out.exr"};
+    const auto with = [](std::vector<std::string> all, const std::vector<std::string>& more) {
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    const std::vector<Numbers> all = {
+        {"vlx-krige", in, {"--strength", "--scale", "--samples", "--threads"}},
+        {"vlx-krige", with(in, {"--fireflies", "clamp"}), {"--clamp"}},
+        {"vlx-krige", with(in, {"--method", "gaussian"}), {"--sigma"}},
+        {"vlx-krige", with(in, {"--method", "paper"}), {"--region"}},
+        {"vlx-krige", in, {"--max-memory"}, "#G"},
+        {"vlx-trace", scene, {"--width", "--height", "--spp", "--time", "--target-error", "--replicates"}},
+        {"vlx-trace", scene, {"--seed", "--max-bounces", "--threads"}},
+        {"vlx-trace", with(scene, {"--hierarchical"}), {"--tolerance"}},
+        {"vlx-trace", with(scene, {"--frames", "1"}), {"--fps"}},
+        {"vlx-trace", scene, {"--env-constant"}, "1,1,#"},
+        {"vlx-trace", scene, {"--shutter"}, "0,#"},
+        {"vlx-trace", scene, {"--shutter"}, "#,1"},
+        {"vlx-trace", scene, {"--crop"}, "0,0,1,#"},
+        {"vlx-compare", {"none.exr", "none.exr"}, {"--threads"}},
+        {"vlx-compare", {"none.exr", "none.exr", "--pictures", "out"}, {"--exposure"}},
+        {"vlx-compare", {"none.exr", "none.exr", "--pictures", "out"}, {"--crop"}, "0,0,1,#"},
+        {"vlx-compare", {"none.exr", "none.exr"}, {"--fail-above"}, "mse=#"},
+        {"vlx-compare", {"none.exr", "none.exr"}, {"--fail-below"}, "psnr=#"},
+        {"vlx-compare", {"sweep", "none.glb", "-o", "out"}, {"--hierarchical", "--trace-seconds", "--spp"}},
+        {"vlx-compare", {"sweep", "none.glb", "-o", "out"}, {"--seeds", "--width", "--detail-spp"}},
+        {"vlx-compare", {"sweep", "none.glb", "-o", "out"}, {"--target"}, "relmse=#"},
+        {"vlx-pack", with({"moments"}, in), {"--samples"}},
+        {"vlx-pack", {"bcd", "none.exr", "none.exr", "-o", "out.exr"}, {"--samples"}},
+        {"vlx-pack", with({"subset"}, in), {"--samples", "--part"}}};
+    for (const Numbers& numbers : all)
+        for (const std::string& option : numbers.options)
+            for (const char* number : {"nan", "inf"}) {
+                std::vector<std::string> arguments = numbers.before;
+                std::string value = numbers.form;
+                arguments.push_back(option + "=" + value.replace(value.find('#'), 1, number));
+                const ToolRun run = runTool(numbers.tool, arguments);
+                const std::string what = numbers.tool + " " + arguments.back();
+                EXPECT_EQ(run.exitCode, 2) << what << "\n" << run.err;
+                EXPECT_NE(run.err.find(option), std::string::npos) << what << "\n" << run.err;
+            }
 }
 
 std::string kindName(const testing::TestParamInfo<MalformedKind>& kind) {

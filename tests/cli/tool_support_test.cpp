@@ -5,6 +5,7 @@
 #include "frames.h"
 #include "help_formatter.h"
 #include "man_page.h"
+#include "tool_main.h"
 
 namespace vlx {
 namespace {
@@ -58,6 +59,20 @@ TEST(ManPage, HoldsOptionsCommandsAndExamplesThatRoffTakesAsTheyAre) {
                              ".nf\nExample:\n  tool command 'a' \\-\\-flag\n.fi\n"})
         EXPECT_NE(page.find(part), std::string::npos) << part << "\nin\n" << page;
     EXPECT_EQ(page.find("hidden"), std::string::npos);
+}
+
+TEST(FiniteNumbers, AreAllThatPasses) {
+    for (const char* text : {"nan", "-nan", "inf", "-inf", "1e999", "", "x", "1x"})
+        for (const CLI::Validator& check : {finiteWithin(-9, 9), finitePositive(), finiteNonNegative()}) {
+            const std::string fault = check(text);
+            EXPECT_NE(fault.find(std::string("found '") + text + "'"), std::string::npos) << text << fault;
+        }
+    EXPECT_EQ(finiteWithin(-9, 9)("9"), "");
+    EXPECT_EQ(finiteWithin(-9, 9)("9.1"), "expected a number of -9 to 9, found '9.1'");
+    EXPECT_EQ(finitePositive()("1e-320"), "");
+    EXPECT_NE(finitePositive()("0"), "");
+    EXPECT_EQ(finiteNonNegative()("0"), "");
+    EXPECT_NE(finiteNonNegative()("-1e-9"), "");
 }
 
 TEST(ParseFrames, ListsRangesAndSteps) {

@@ -266,6 +266,36 @@ TEST(VlxTrace, TakesTheFirstUsableCameraAndSaysSo) {
     EXPECT_NE(asked.err.find("not a perspective"), std::string::npos) << asked.err;
 }
 
+TEST(VlxTrace, WhatIsWrongWithTheViewIsToldBeforeTheSceneIsRead) {
+    const TemporaryFolder folder;
+    const std::string dark = camerasOnly(folder / "dark.gltf", "[" + perspective("1") + "]");
+    const auto ends = [&](const std::vector<std::string>& options, int code, const std::string& words) {
+        std::vector<std::string> arguments = {dark, "-o", folder / "a.exr"};
+        arguments.insert(arguments.end(), options.begin(), options.end());
+        const ToolRun run = trace(arguments);
+        EXPECT_EQ(run.exitCode, code) << words << run.err;
+        EXPECT_NE(run.err.find(words), std::string::npos) << words << "\n" << run.err;
+        EXPECT_EQ(run.err.find("--env"), std::string::npos) << run.err;
+        EXPECT_EQ(folder.entries(), 1);
+    };
+    ends({"--camera", "7"}, 1, "has no camera '7'; it has 'cam0'");
+    ends({"--crop", "0,0,9,9", "--width", "8"}, 2, "found --crop 0,0,9,9");
+    ends({"--width", "1048576"}, 2, "at most 4294967296 pixels to trace, found 1048576 x 1048576");
+    ends({"--width", "1048576"}, 2, "--crop or --band");
+    ends({"--width", "131072", "--crop", "0,0,131072,65536"}, 2, "found 131072 x 65536");
+    EXPECT_NE(trace({dark, "-o", folder / "a.exr"}).err.find("--env"), std::string::npos);
+    // A part of a large picture is traced.
+    EXPECT_EQ(trace({dark, "-o", folder / "a.exr", "--env-constant", "1,1,1", "--spp", "1", "--width",
+                     "1048576", "--crop", "500000,500000,8,8"})
+                  .exitCode,
+              0);
+    // What no memory holds is not begun.
+    const ToolRun wide = trace({dark, "-o", folder / "b.exr", "--env-constant", "1,1,1", "--width", "1048576",
+                                "--height", "4", "--spp", "16777216", "--integrator", "path"});
+    EXPECT_EQ(wide.exitCode, 1) << wide.err;
+    EXPECT_NE(wide.err.find("a smaller --width, --crop or --spp"), std::string::npos) << wide.err;
+}
+
 TEST(VlxTrace, PicturesOfACamerasAspectAreOfASizeThereIs) {
     const TemporaryFolder folder;
     for (const char* aspect : {"2e-8", "1e30", "0", "-1", "-1e30", "1e-300"}) {

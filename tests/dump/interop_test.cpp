@@ -127,6 +127,12 @@ TEST(DumpInterop, NeedsRadianceChannels) {
     writeWithOpenExr(folder / "a.exr", dump);
     EXPECT_NE(errorOf([&] { DumpReader(folder / "a.exr"); }).find("channels R, G and B, found R, Z"),
               std::string::npos);
+    // Also of luminance: what else there is to do.
+    const TestDump grey = makeDump({0, 0, 4, 4}, {{"Y", ChannelType::Float}}, [](int, int) { return 2; });
+    writeWithOpenExr(folder / "grey.exr", grey);
+    const std::string message = errorOf([&] { DumpReader(folder / "grey.exr"); });
+    for (const char* words : {"found Y", "luminance as all three", "--map R=CHANNEL", "vlx-pack stack"})
+        EXPECT_NE(message.find(words), std::string::npos) << message;
 }
 
 // Part of a dump of another renderer, written by OpenImageIO: see testdata/dumps/README.md.

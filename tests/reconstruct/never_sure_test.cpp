@@ -112,6 +112,59 @@ TEST(NeverSure, AgreementOfFewSamplesIsNoKnowledge) {
         for (const char* channel : {"stddev.R", "stddev.G", "stddev.B"}) EXPECT_GT(least(image, channel), 0);
 }
 
+// Pixels of unlike levels, the samples of each alike: what a region's samples did not see they all did not.
+TEST(NeverSure, ThePaperKnowsThatSamplesAgreeByChance) {
+    for (const int spp : {1, 2, 4})
+        for (const bool ramp : {false, true}) {
+            const SampleBuffer dump =
+                picture(24, {"R", "G", "B"}, 3, [&](int x, int y, Random& random, auto& samples) {
+                    std::uniform_real_distribution<float> level(0.2f, 1);
+                    const float z = ramp ? 0.02f * static_cast<float>(x + y) : level(random);
+                    for (int s = 0; s < spp; ++s) samples.push_back({z, z, 0.3f});
+                });
+            const Image image = reconstructPaper(dump, {}).image;
+            // A pixel's own samples or its region's: sqrt(3 / N / n) of the level, n from spp to N = 16 spp.
+            const double most = std::sqrt(3.0 / 16) / spp, smallest = most / 4;
+            for (const char* channel : {"stddev.R", "stddev.B"})
+                EXPECT_GT(least(image, channel), 0.9 * smallest * 0.46) << channel << spp << ramp;
+            for (int y = 0; y < 24; ++y)
+                for (int x = 0; x < 24; ++x) {
+                    EXPECT_EQ(image.at(x, y)[2], 0.3f);
+                    EXPECT_LT(deviation(image, x, y, 2), 1.1 * most) << spp << ramp;
+                }
+        }
+}
+
+// Samples that differ tell their variance: nothing is added.
+TEST(NeverSure, ThePaperTakesWhatSamplesTell) {
+    const Image image = reconstructPaper(greyWith(16, 4, [](int, int) { return true; }), {}).image;
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 16; ++x) EXPECT_LT(deviation(image, x, y), 0.05 / std::sqrt(4) * 1.5);
+}
+
+TEST(NeverSure, ThePaperIsInDoubtWhereThereAreNoSamples) {
+    const auto there = [](int x, int y) { return x >= 8 || y >= 8; };
+    const Reconstruction result = reconstructPaper(greyWith(16, 4, there), {});
+    EXPECT_EQ(result.report.regions[static_cast<std::size_t>(RegionOutcome::Empty)], 4);
+    EXPECT_EQ(result.report.emptyPixels, 64);
+    EXPECT_EQ(result.image.at(2, 2)[0], 0);
+    EXPECT_GT(deviation(result.image, 2, 2), 0.45);
+}
+
+TEST(NeverSure, ThePlainMeanIsItsSamplesOwnStatistic) {
+    const Image image = reconstructMean(rareLight(4, 0.01, 1)).image;
+    EXPECT_EQ(least(image, "stddev.R"), 0);
+    // One of four samples is 1: s^2 = 1/4, over 4.
+    bool lit = false;
+    for (int y = 0; y < 48; ++y)
+        for (int x = 0; x < 48; ++x)
+            if (image.at(x, y)[0] == 0.25f) {
+                EXPECT_FLOAT_EQ(deviation(image, x, y), 0.25f);
+                lit = true;
+            }
+    EXPECT_TRUE(lit);
+}
+
 TEST(NeverSure, ABlackPictureMayHaveMissedLight) {
     const SampleBuffer dump = picture(20, {"R", "G", "B"}, 1, [](int, int, Random&, auto& samples) {
         samples.push_back({0, 0, 0});
@@ -289,6 +342,32 @@ TEST(NeverSure, AWildFeatureValueCostsItsPixelOnly) {
             EXPECT_LT(errorWith(feature, value, two), 2 * tame) << feature << " " << value;
         }
     }
+}
+
+// Squares of radiance beyond 1e19 are no floats: such samples are dropped as if they were not finite.
+TEST(NeverSure, RadianceBeyondAllLightCostsItsSamplesOnly) {
+    for (const float wild : {1e14f, 2e15f, 1e19f, 1e30f, 3e38f, -1e30f})
+        for (const bool stated : {false, true})
+            for (const Fireflies fireflies : {Fireflies::Keep, Fireflies::Robust}) {
+                std::vector<std::string> channels = {"R", "G", "B"};
+                if (stated) channels.insert(channels.end(), {"variance.R", "variance.G", "variance.B"});
+                const SampleBuffer dump =
+                    picture(24, channels, 5, [&](int x, int y, Random& random, auto& samples) {
+                        std::normal_distribution<float> noise(0.5f, 0.05f);
+                        for (int s = 0; s < 4; ++s) {
+                            const float z = x == 12 && y == 12 && s < 2 ? wild : noise(random);
+                            samples.push_back({z, noise(random), noise(random)});
+                            if (stated) samples.back().resize(6, std::abs(z) > 1 ? std::abs(wild) : 0.0025f);
+                        }
+                    });
+                const Reconstruction result = reconstructDriftKriging(dump, {.fireflies = fireflies});
+                for (const float value : result.image.pixels) ASSERT_TRUE(std::isfinite(value)) << wild;
+                EXPECT_GT(least(result.image, "stddev.R"), 0) << wild;
+                EXPECT_EQ(result.report.droppedSamples, wild == 1e14f ? 0 : 2) << wild;
+                if (wild == 1e14f) continue;
+                EXPECT_NEAR(result.image.at(12, 12)[0], 0.5, 0.2) << wild;
+                EXPECT_NE(toText(result.report).find("beyond 10^15"), std::string::npos);
+            }
 }
 
 // A background at an unlimited depth is no reason to forget what depth says elsewhere.

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "make_band.h"
+#include "variolux/dump/sample_buffer.h"
 #include "variolux/geostat/kriging.h"
 
 namespace vlx {
@@ -42,6 +43,28 @@ TEST(KrigeRegion, AllEqualIsThatValueWithoutError) {
         EXPECT_FLOAT_EQ(static_cast<float>(estimate.values(p, 0)), 0.3f);
         EXPECT_EQ(estimate.stddev(p, 0), 0);
     }
+}
+
+// 256 exact data of a smooth surface: the covariance matrix is singular in double precision.
+TEST(ReconstructPaper, CountsWhatMayBeOffByRounding) {
+    const SampleBand band = makeBand(kRegion, 32, [](int column, int row, int i) {
+        const float x = stratumX(column, i), y = stratumY(row, i);
+        const float z = 2 + std::sin(0.75f * (x - 10)) * std::cos(0.75f * (y - 6));
+        return MadeSample{z, z, z, x, y};
+    });
+    const RegionDiagnostics region = krigeRegion(gather(band), {.colourDistance = false}).diagnostics;
+    EXPECT_EQ(region.outcome, RegionOutcome::Kriged);
+    EXPECT_EQ(region.inaccurate, 16);
+    DumpHeader header;
+    header.data = header.display = kRegion;
+    for (const std::string& channel : band.channels) header.channels.push_back({channel, ChannelType::Float});
+    const Reconstruction result =
+        reconstructPaper(SampleBuffer(header, band, "ramp"), {.colourDistance = false});
+    EXPECT_EQ(result.report.inaccuratePixels, 16);
+    EXPECT_NE(toText(result.report).find("16 pixels of ill-conditioned systems"), std::string::npos);
+    EXPECT_NE(toJson(result.report).find("\"inaccuratePixels\": 16"), std::string::npos);
+    const SampleBand noisy = ramp(32, 0.3, 1);
+    EXPECT_EQ(krigeRegion(gather(noisy), {}).diagnostics.inaccurate, 0);
 }
 
 TEST(KrigeRegion, FewSamplesGiveTheirMean) {

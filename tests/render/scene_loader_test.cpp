@@ -405,6 +405,69 @@ TEST(BadScene, FilesThatAreNone) {
     }
 }
 
+// Whatever else the file holds: in text and binary, with a camera that stands and one that moves.
+TEST(LoadCameras, ReadsOnlyWhatTheyNeed) {
+    const std::pair<const char*, std::function<void(GltfText&)>> broken[] = {
+        {"nothing", [](GltfText&) {}},
+        {"texture of no image",
+         [](GltfText& g) {
+             g.json["textures"] = {{{"source", 7}}};
+         }},
+        {"image that is none",
+         [](GltfText& g) {
+             g.texture({1, 2, 3});
+         }},
+        {"required Draco geometry",
+         [](GltfText& g) {
+             g.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+             g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"] = {
+                 {"bufferView", 0}, {"attributes", {{"POSITION", 0}}}};
+         }},
+        {"mesh that is not there", [](GltfText& g) { g.json["nodes"][0]["mesh"] = 4; }},
+        {"light that is not there", [](GltfText& g) { g.json.erase("extensions"); }},
+        {"animation of the mesh without accessors", [](GltfText& g) {
+             g.json["animations"].push_back(
+                 {{"samplers", {{{"input", 90}, {"output", 91}}}},
+                  {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}}}});
+         }}};
+    for (const bool moves : {false, true})
+        for (const auto& [what, breakIt] : broken) {
+            GltfText g;
+            g.json["nodes"].push_back({{"children", {1}}, {"name", "dolly"}});
+            g.json["scenes"][0]["nodes"] = {0, 2, 3};
+            if (moves) {
+                const int times = g.floats({0, 1}, "SCALAR"), places = g.floats({0, 0, 0, 8, 0, 0}, "VEC3");
+                g.json["animations"].push_back(
+                    {{"samplers", {{{"input", times}, {"output", places}}}},
+                     {"channels", {{{"sampler", 0}, {"target", {{"node", 3}, {"path", "translation"}}}}}}});
+            }
+            breakIt(g);
+            writeText(folder() / "cameras.gltf", g.text());
+            writeText(folder() / "cameras.glb", g.binary());
+            for (const char* name : {"cameras.gltf", "cameras.glb"}) {
+                const Scene s = loadCameras(folder() / name, {0.5, 0.5});
+                ASSERT_EQ(s.cameras.size(), 1u) << what << name;
+                EXPECT_EQ(s.cameras[0].name, "eye") << what << name;
+                EXPECT_EQ(s.cameras[0].unusable, "") << what << name;
+                EXPECT_NEAR(s.cameras[0].toWorld.m[0][3], moves ? 4 : 0, 1e-6) << what << name;
+                EXPECT_TRUE(s.report.warnings.empty()) << what << name;
+            }
+        }
+    // Of a binary file that ends after its JSON there is enough.
+    writeText(folder() / "cut.glb", GltfText().binary().substr(0, GltfText().binary().size() - 20));
+    EXPECT_EQ(loadCameras(folder() / "cut.glb").cameras.size(), 1u);
+    // A buffer that is missing is none of theirs, unless they move by it.
+    GltfText g;
+    g.json["buffers"] = {{{"byteLength", 100}, {"uri", "missing.bin"}}};
+    writeText(folder() / "cameras.gltf", g.text());
+    EXPECT_EQ(loadCameras(folder() / "cameras.gltf").cameras.size(), 1u);
+    for (const char* text : {"", "{", "[]", "glTF"}) {
+        writeText(folder() / "cameras.gltf", text);
+        EXPECT_THROW(loadCameras(folder() / "cameras.gltf"), Error) << text;
+    }
+    EXPECT_THROW(loadCameras(folder() / "missing.gltf"), Error);
+}
+
 TEST(BadScene, EveryTruncationOfABinaryFileIsAnError) {
     const std::string whole = GltfText().binary();
     for (std::size_t size = 0; size < whole.size(); size += 7) {

@@ -33,7 +33,11 @@ inline constexpr int kMaxRegionData = 4096;
 /// The estimates of one region.
 struct RegionEstimate {
     Eigen::MatrixXd values;  ///< pixels x c, row by row from the region's top left
-    Eigen::MatrixXd stddev;  ///< pixels x c: standard deviation of the error
+    Eigen::MatrixXd stddev;  ///< pixels x c: standard deviation of the error, as far as the data tell
+    /// pixels x 3: sum of w_i^2 / n_i, w the data's weights and n their counts, over the data whose samples
+    /// do not differ (within the rounding of half floats) or, where no pixel holds two, whose noise by the
+    /// nugget is below unseenVariance(): what one sample's variance, which they do not tell, adds.
+    Eigen::MatrixXd agreed;
     RegionDiagnostics diagnostics;
     RegionInspection inspection;  ///< only when asked for
 };
@@ -59,14 +63,18 @@ struct RegionEstimate {
 /// Where no pixel holds two samples their errors are unknown: the fitted nugget is then taken for noise,
 /// except with the whole image as region, whose samples count as exact (the paper's figure 1).
 ///
-/// A region that cannot be kriged gets its mean; `diagnostics.outcome` says why. Never throws for numerical
-/// reasons; every value returned is finite.
-/// With `inspect`, `inspection` tells everything behind the estimate, which is not changed by that.
+/// A region that cannot be kriged gets its mean; `diagnostics.outcome` says why. Pixels whose solution is
+/// less accurate than geostat's tolerance are counted. Never throws for numerical reasons; every value
+/// returned is finite. With `inspect`, `inspection` tells everything behind the estimate, which is not
+/// changed by that.
 RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, bool inspect = false);
 
-/// The method over a whole dump, region by region. Deterministic for any number of threads.
-/// Throws as SampleSource::read; Error when options are invalid or a region holds more than kMaxRegionData
-/// cells.
+/// The method over a whole dump, region by region. No pixel is sure of itself: where not two of a region's N
+/// samples differ, one sample's variance is taken to be that of what they may not have seen, 3 / N times the
+/// square of the pixel's level or the picture's mean (drift_kriging.h, 7); it changes the errors, not the
+/// estimates. A region without samples is 0, with the picture's spread about 0 as its error. Deterministic
+/// for any number of threads. Throws as SampleSource::read; Error when options are invalid or a region holds
+/// more than kMaxRegionData cells.
 Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& options,
                                 const Progress& progress = {});
 

@@ -42,6 +42,7 @@ struct RegionDiagnostics {
     double colourScale = 0;    ///< pixels of composite distance a unit of radiance; 0 when off
     double condition = 0;      ///< estimated condition number of the system, 0 where none was solved
     double jitter = 0;         ///< relative diagonal jitter that the solver had to add; 0 normally
+    int inaccurate = 0;  ///< pixels whose kriging is less accurate than asked (TargetStatus::Inaccurate)
 };
 
 /// What a run did, for people and machines.
@@ -51,9 +52,10 @@ struct ReconstructionReport {
     std::int64_t droppedSamples = 0;                      ///< non-finite radiance: left out
     std::int64_t emptyPixels = 0;                         ///< pixels without a usable sample of their own
     std::int64_t jitteredSystems = 0;                     ///< kriging systems that needed jitter
-    std::int64_t farPixels = 0;                           ///< of them, with none within 5 pixels either
-    std::int64_t exactPixels = 0;                         ///< the dump states an error of 0: kept as they are
-    std::int64_t limitedSamples = 0;                      ///< made darker by the firefly estimator
+    std::int64_t inaccuratePixels = 0;      ///< of regions: rounding may show (TargetStatus::Inaccurate)
+    std::int64_t farPixels = 0;             ///< of them, with none within 5 pixels either
+    std::int64_t exactPixels = 0;           ///< the dump states an error of 0: kept as they are
+    std::int64_t limitedSamples = 0;        ///< made darker by the firefly estimator
     double energyRemoved = 0;               ///< share of all samples' luminance that this took away
     double energyReturned = 0;              ///< and that was given back around them
     std::int64_t neighbourhoods = 0;        ///< kriged (default method), over models and halves
