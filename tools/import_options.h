@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "variolux/dump/moments.h"
+#include "import/moments.h"
 
 /// Options of images by other renderers, the same in vlx-pack and vlx-krige.
 namespace vlx {

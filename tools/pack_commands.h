@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "variolux/dump/import.h"
+#include "import/import.h"
 
 namespace vlx {
 

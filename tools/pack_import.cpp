@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "finished.h"
+#include "import/bcd.h"
+#include "import/moments.h"
+#include "import/sbmc.h"
+#include "import/stack.h"
 #include "import_options.h"
 #include "pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
-#include "variolux/dump/bcd.h"
-#include "variolux/dump/moments.h"
-#include "variolux/dump/sbmc.h"
-#include "variolux/dump/stack.h"
 
 namespace vlx {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "compare_sweep.h"
 #include "finished.h"
+#include "sweep/compare_sweep.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"

@@ -10,8 +10,11 @@
 #include <optional>
 #include <string>
 
+#include "exr/flat_header.h"
 #include "finished.h"
 #include "frames.h"
+#include "import/bcd.h"
+#include "import/image_layers.h"
 #include "import_options.h"
 #include "progress_bar.h"
 #include "tool_main.h"
@@ -20,8 +23,6 @@
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
 #include "variolux/compare/gaussian.h"
-#include "variolux/dump/bcd.h"
-#include "variolux/dump/image_layers.h"
 #include "variolux/dump/layers.h"
 #include "variolux/dump/positions.h"
 #include "variolux/dump/reader.h"

@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <iostream>
 
+#include "edit/info.h"
+#include "edit/merge.h"
+#include "edit/subset.h"
 #include "finished.h"
+#include "import/import.h"
+#include "import/points.h"
 #include "pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
-#include "variolux/dump/import.h"
-#include "variolux/dump/info.h"
-#include "variolux/dump/merge.h"
-#include "variolux/dump/points.h"
-#include "variolux/dump/subset.h"
 
 namespace {
 

@@ -9,15 +9,15 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "choose_integrator.h"
 #include "finished.h"
 #include "frames.h"
-#include "gltf_references.h"
-#include "pilot.h"
-#include "plan.h"
 #include "progress_bar.h"
-#include "render.h"
-#include "scene_loader.h"
+#include "render/film/render.h"
+#include "render/gltf/gltf_references.h"
+#include "render/pilot/choose_integrator.h"
+#include "render/pilot/pilot.h"
+#include "render/plan/plan.h"
+#include "render/scene/scene_loader.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"

@@ -1,4 +1,4 @@
-#include "canvas.h"
+#include "compare/canvas.h"
 
 #include <algorithm>
 #include <array>

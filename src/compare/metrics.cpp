@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "ssim.h"
+#include "compare/ssim.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
 

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <functional>
 
-#include "canvas.h"
+#include "compare/canvas.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/parallel.h"

@@ -1,4 +1,4 @@
-#include "exr_header.h"
+#include "dump/exr_header.h"
 
 #include <ImfChannelList.h>
 #include <ImfCompressionAttribute.h>
@@ -20,8 +20,8 @@
 #include <cstring>
 #include <set>
 
-#include "header_walker.h"
-#include "little_endian.h"
+#include "exr/header_walker.h"
+#include "exr/little_endian.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/dump/splats.h"
@@ -311,11 +311,6 @@ std::vector<std::string> splatChannels(int replicates) {
             names.push_back(
                 {'r', static_cast<char>('0' + r / 10), static_cast<char>('0' + r % 10), '.', channel});
     return names;
-}
-
-std::string windowText(const Window& window) {
-    return std::to_string(window.width) + " x " + std::to_string(window.height) + " pixels at (" +
-           std::to_string(window.x) + ", " + std::to_string(window.y) + ")";
 }
 
 std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& start, std::uint64_t fileBytes) {

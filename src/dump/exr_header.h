@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "chunk_codec.h"
+#include "exr/chunk_codec.h"
 #include "variolux/dump/format.h"
 
 namespace vlx {
@@ -42,8 +42,5 @@ std::vector<std::string> beautyChannels(const DumpHeader& dump);
 /// Bytes of a chunk before its data: part number, row, and sizes.
 constexpr std::size_t kDeepChunkHead = 4 + 3 * 8;  ///< without the part number
 constexpr std::size_t kPartNumber = 4;
-
-/// "4 x 3 pixels at (0, 0)".
-std::string windowText(const Window& window);
 
 }  // namespace vlx

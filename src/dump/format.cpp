@@ -1,5 +1,6 @@
 #include "variolux/dump/format.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "variolux/base/image_io.h"
@@ -26,6 +27,54 @@ std::optional<std::uint32_t> replicateNumber(float value) {
 void setInputs(DumpHeader& header, const std::string& inputs) {
     header.extra.erase(kInputsAttribute);
     if (!inputs.empty()) header.extra[kInputsAttribute] = inputs;
+}
+
+std::vector<MissingPart> missingChannels(const DumpHeader& header) {
+    const auto has = [&](std::initializer_list<const char*> names) {
+        return std::all_of(names.begin(), names.end(),
+                           [&](const char* name) { return findChannel(header, name) >= 0; });
+    };
+    std::vector<MissingPart> missing;
+    const auto lacks = [&](const std::string& what, const std::string& cost) {
+        missing.push_back({what, cost});
+    };
+    if (!has({"sample.x", "sample.y"}))
+        lacks("sample positions (sample.x, sample.y)",
+              "samples count as taken at their pixel's centre: nothing finer than a pixel can be told apart");
+    if (!has({"albedo.R", "albedo.G", "albedo.B"}))
+        lacks("albedo (albedo.R, albedo.G, albedo.B)",
+              "texture must be told from noise by radiance alone: it comes out softer");
+    if (!has({"N.X", "N.Y", "N.Z"}))
+        lacks("normals (N.X, N.Y, N.Z)", "edges and curvature of surfaces do not guide the reconstruction");
+    if (!has({"Z"})) lacks("distance (Z)", "borders between near and far do not guide the reconstruction");
+    if (!has({"A"}))
+        lacks("hit flag (A)", "pixels that see past the scene are not told apart, the image has no alpha");
+    if (!has({"sample.replicate"}))
+        lacks("replicates (sample.replicate)",
+              "samples count as independent: for low-discrepancy samples the error is overstated");
+    if (header.pixelFilter.empty())
+        lacks("pixel filter (variolux:pixelFilter)", "a box filter of one pixel is assumed");
+    return missing;
+}
+
+std::optional<std::array<std::string, 3>> layerTriple(const std::vector<std::string>& names,
+                                                      const std::string& layer) {
+    for (const char* ends : {"RGB", "rgb", "XYZ", "xyz"}) {
+        std::array<std::string, 3> triple;
+        for (std::size_t c = 0; c < 3; ++c) triple[c] = (layer.empty() ? "" : layer + ".") + ends[c];
+        if (std::all_of(triple.begin(), triple.end(), [&](const std::string& name) {
+                return std::find(names.begin(), names.end(), name) != names.end();
+            }))
+            return triple;
+    }
+    return std::nullopt;
+}
+
+std::vector<std::string> radianceChannels(const std::vector<std::string>& names, const std::string& name) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) return {name};
+    if (const auto triple = name.empty() ? std::nullopt : layerTriple(names, name))
+        return {triple->begin(), triple->end()};
+    return {};
 }
 
 int findChannel(const DumpHeader& header, std::string_view name) {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "exr_header.h"
-#include "stored_values.h"
+#include "dump/exr_header.h"
+#include "dump/stored_values.h"
 #include "variolux/base/error.h"
 
 namespace vlx {

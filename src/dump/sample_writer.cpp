@@ -6,8 +6,8 @@
 #include <optional>
 #include <tuple>
 
-#include "exr_header.h"
-#include "raw_file.h"
+#include "dump/exr_header.h"
+#include "exr/raw_file.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
 #include "variolux/dump/writer.h"

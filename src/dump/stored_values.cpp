@@ -1,4 +1,4 @@
-#include "stored_values.h"
+#include "dump/stored_values.h"
 
 #include <Imath/half.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "exr_header.h"
+#include "dump/exr_header.h"
 #include "variolux/base/error.h"
 
 namespace vlx {

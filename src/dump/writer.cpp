@@ -15,11 +15,11 @@
 #include <set>
 #include <thread>
 
-#include "exr_header.h"
-#include "little_endian.h"
-#include "pool.h"
-#include "raw_file.h"
-#include "stored_values.h"
+#include "dump/exr_header.h"
+#include "dump/pool.h"
+#include "dump/stored_values.h"
+#include "exr/little_endian.h"
+#include "exr/raw_file.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "batch_kernel.h"
-#include "entry_error.h"
+#include "geostat/batch_kernel.h"
+#include "geostat/entry_error.h"
 #include "variolux/geostat/kriging.h"
 
 namespace vlx::kernels {

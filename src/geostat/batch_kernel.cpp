@@ -1,9 +1,9 @@
-#include "batch_kernel.h"
+#include "geostat/batch_kernel.h"
 
 #include <algorithm>
 
-#include "structure_kernel.h"
-#include "vector_math.h"
+#include "geostat/structure_kernel.h"
+#include "geostat/vector_math.h"
 
 namespace vlx::kernels {
 namespace {

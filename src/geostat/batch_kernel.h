@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "kernels.h"
+#include "geostat/kernels.h"
 
 /// Kriging of several systems at once, one a vector lane. All lanes have the same shape; a lane's numbers
 /// depend on nothing in the others, and operations have one order, so that results do not depend on how

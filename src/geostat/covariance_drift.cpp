@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kriging_names.h"
+#include "geostat/kriging_names.h"
 #include "variolux/geostat/covariance_system.h"
 
 namespace vlx {

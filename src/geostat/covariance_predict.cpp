@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "kriging_names.h"
+#include "geostat/kriging_names.h"
 #include "variolux/geostat/covariance_system.h"
 
 namespace vlx {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "kernels.h"
-#include "kriging_names.h"
+#include "geostat/kernels.h"
+#include "geostat/kriging_names.h"
 
 namespace vlx {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "kriging_names.h"
+#include "geostat/kriging_names.h"
 #include "variolux/geostat/variogram_model.h"
 
 /// How far the computed entries of a covariance matrix are from those of the model.

@@ -1,10 +1,10 @@
-#include "kernels.h"
+#include "geostat/kernels.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "structure_kernel.h"
-#include "vector_math.h"
+#include "geostat/structure_kernel.h"
+#include "geostat/vector_math.h"
 
 namespace vlx::kernels {
 namespace {

@@ -5,9 +5,9 @@
 #include <numeric>
 #include <sstream>
 
-#include "entry_error.h"
-#include "kernels.h"
-#include "kriging_names.h"
+#include "geostat/entry_error.h"
+#include "geostat/kernels.h"
+#include "geostat/kriging_names.h"
 
 namespace vlx {
 /// One target: a point, or the points of a block with weights that sum to 1.

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "batch_bounds.h"
+#include "geostat/batch_bounds.h"
 
 namespace vlx {
 namespace {

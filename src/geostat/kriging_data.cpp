@@ -4,7 +4,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "kriging_names.h"
+#include "geostat/kriging_names.h"
 #include "variolux/geostat/kriging.h"
 
 namespace vlx {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <mutex>
 
-#include "kriging_names.h"
-#include "precise_kriging.h"
+#include "geostat/kriging_names.h"
+#include "geostat/precise_kriging.h"
 #include "variolux/geostat/kriging.h"
 
 namespace vlx {

@@ -1,4 +1,4 @@
-#include "precise_kriging.h"
+#include "geostat/precise_kriging.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <optional>
 #include <tuple>
 
-#include "kriging_names.h"
-#include "precise_system.h"
+#include "geostat/kriging_names.h"
+#include "geostat/precise_system.h"
 
 namespace vlx {
 namespace {

@@ -5,9 +5,9 @@
 #include <limits>
 #include <vector>
 
-#include "kriging_names.h"
-#include "precise_kriging.h"
-#include "precise_model.h"
+#include "geostat/kriging_names.h"
+#include "geostat/precise_kriging.h"
+#include "geostat/precise_model.h"
 
 namespace vlx::precise {
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <sstream>
 
-#include "projected_bfgs.h"
+#include "geostat/projected_bfgs.h"
 
 namespace vlx {
 namespace {

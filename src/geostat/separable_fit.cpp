@@ -1,11 +1,11 @@
-#include "separable_fit.h"
+#include "geostat/separable_fit.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "simplex.h"
+#include "geostat/simplex.h"
 
 namespace vlx::separable {
 

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "geostat/vector_math.h"
 #include "variolux/geostat/variogram_model.h"
-#include "vector_math.h"
 
 namespace vlx::kernels {
 

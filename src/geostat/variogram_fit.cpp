@@ -7,7 +7,7 @@
 #include <limits>
 #include <sstream>
 
-#include "separable_fit.h"
+#include "geostat/separable_fit.h"
 
 namespace vlx {
 namespace {

@@ -6,11 +6,11 @@
 #include <chrono>
 #include <limits>
 
-#include "accelerator.h"
-#include "path_tracer.h"
-#include "plan.h"
-#include "region_sampling.h"
-#include "scene_loader.h"
+#include "render/film/region_sampling.h"
+#include "render/integrator/path_tracer.h"
+#include "render/plan/plan.h"
+#include "render/scene/accelerator.h"
+#include "render/scene/scene_loader.h"
 
 namespace vlx::render {
 namespace {

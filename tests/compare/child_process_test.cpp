@@ -1,4 +1,4 @@
-#include "variolux/compare/child_process.h"
+#include "sweep/child_process.h"
 
 #include <gtest/gtest.h>
 #include <pthread.h>

@@ -1,4 +1,4 @@
-#include "variolux/compare/sweep.h"
+#include "sweep/sweep.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "sweep/sweep_page.h"
+#include "sweep/sweep_summary.h"
 #include "variolux/base/error.h"
-#include "variolux/compare/sweep_page.h"
-#include "variolux/compare/sweep_summary.h"
 
 namespace vlx {
 namespace {

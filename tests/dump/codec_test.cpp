@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <random>
 
-#include "chunk_codec.h"
+#include "exr/chunk_codec.h"
 
 namespace vlx {
 namespace {

@@ -1,16 +1,16 @@
 // Copies of renderers' files with some layers replaced: all else must be there, bit for bit.
 
-#include "variolux/dump/image_layers.h"
+#include "import/image_layers.h"
 
 #include <gtest/gtest.h>
 
 #include "../base/temporary_folder.h"
-#include "header_walker.h"
+#include "exr/header_walker.h"
+#include "import/moments.h"
 #include "layer_files.h"
 #include "renderer_files.h"
 #include "test_dumps.h"
 #include "variolux/base/image_io.h"
-#include "variolux/dump/moments.h"
 
 namespace vlx {
 namespace {

@@ -6,13 +6,13 @@
 #include <cstring>
 
 #include "../base/temporary_folder.h"
+#include "import/bcd.h"
+#include "import/sbmc.h"
+#include "import/stack.h"
 #include "renderer_files.h"
 #include "test_dumps.h"
 #include "variolux/base/image_io.h"
-#include "variolux/dump/bcd.h"
 #include "variolux/dump/reader.h"
-#include "variolux/dump/sbmc.h"
-#include "variolux/dump/stack.h"
 
 namespace vlx {
 namespace {

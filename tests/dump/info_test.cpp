@@ -1,4 +1,4 @@
-#include "variolux/dump/info.h"
+#include "edit/info.h"
 
 #include <gtest/gtest.h>
 

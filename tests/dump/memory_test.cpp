@@ -11,12 +11,12 @@
 #include <random>
 
 #include "../base/temporary_folder.h"
-#include "exr_header.h"
-#include "little_endian.h"
+#include "dump/exr_header.h"
+#include "edit/info.h"
+#include "exr/little_endian.h"
 #include "test_dumps.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
-#include "variolux/dump/info.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
 

@@ -1,4 +1,4 @@
-#include "variolux/dump/merge.h"
+#include "edit/merge.h"
 
 #include <gtest/gtest.h>
 

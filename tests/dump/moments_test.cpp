@@ -1,6 +1,6 @@
 // Importers of means and variances: each renderer's idea of a variance, and the halves made of them.
 
-#include "variolux/dump/moments.h"
+#include "import/moments.h"
 
 #include <gtest/gtest.h>
 
@@ -10,11 +10,11 @@
 #include <random>
 
 #include "../base/temporary_folder.h"
+#include "edit/info.h"
+#include "import/bcd.h"
 #include "renderer_files.h"
 #include "test_dumps.h"
 #include "variolux/base/image_io.h"
-#include "variolux/dump/bcd.h"
-#include "variolux/dump/info.h"
 #include "variolux/dump/reader.h"
 
 namespace vlx {

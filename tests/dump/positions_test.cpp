@@ -11,12 +11,12 @@
 #include <random>
 
 #include "../base/temporary_folder.h"
+#include "edit/info.h"
+#include "edit/subset.h"
 #include "test_dumps.h"
-#include "variolux/dump/info.h"
 #include "variolux/dump/layers.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/sample_buffer.h"
-#include "variolux/dump/subset.h"
 
 namespace vlx {
 namespace {

@@ -11,11 +11,11 @@
 #include <filesystem>
 
 #include "../base/temporary_folder.h"
+#include "edit/merge.h"
+#include "edit/subset.h"
 #include "openexr_files.h"
 #include "test_dumps.h"
-#include "variolux/dump/merge.h"
 #include "variolux/dump/reader.h"
-#include "variolux/dump/subset.h"
 #include "variolux/dump/writer.h"
 
 namespace vlx {

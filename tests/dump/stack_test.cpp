@@ -1,4 +1,4 @@
-#include "variolux/dump/stack.h"
+#include "import/stack.h"
 
 #include <gtest/gtest.h>
 

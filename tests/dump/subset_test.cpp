@@ -1,4 +1,4 @@
-#include "variolux/dump/subset.h"
+#include "edit/subset.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 // BCD's raw samples.
 
 #include "fuzz_file.h"
+#include "import/bcd.h"
 #include "variolux/base/error.h"
-#include "variolux/dump/bcd.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static vlx::FuzzFile file(".raw");

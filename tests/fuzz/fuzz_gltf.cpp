@@ -1,7 +1,7 @@
 // The loader of glTF scenes.
 
 #include "fuzz_file.h"
-#include "scene_loader.h"
+#include "render/scene/scene_loader.h"
 #include "variolux/base/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,11 +1,11 @@
 // Flat images: stacks, half-buffers, moments, BCD's statistics, merging. The first byte says which.
 
+#include "edit/merge.h"
 #include "fuzz_file.h"
+#include "import/bcd.h"
+#include "import/moments.h"
+#include "import/stack.h"
 #include "variolux/base/error.h"
-#include "variolux/dump/bcd.h"
-#include "variolux/dump/merge.h"
-#include "variolux/dump/moments.h"
-#include "variolux/dump/stack.h"
 
 namespace {
 

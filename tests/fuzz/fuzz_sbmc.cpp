@@ -1,8 +1,8 @@
 // SBMC's tiles.
 
 #include "fuzz_file.h"
+#include "import/sbmc.h"
 #include "variolux/base/error.h"
-#include "variolux/dump/sbmc.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static vlx::FuzzFile file(".bin");

@@ -1,4 +1,4 @@
-#include "kernels.h"
+#include "geostat/kernels.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "half_resolution.h"
+#include "reconstruct/drift/half_resolution.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "finishing.h"
+#include "reconstruct/drift/finishing.h"
 #include "variolux/base/parallel.h"
 
 namespace vlx {

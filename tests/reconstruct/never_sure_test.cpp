@@ -8,8 +8,8 @@
 #include <limits>
 #include <random>
 
-#include "gap_field.h"
-#include "picture_scale.h"
+#include "reconstruct/common/picture_scale.h"
+#include "reconstruct/drift/gap_field.h"
 #include "variolux/dump/sample_buffer.h"
 #include "variolux/reconstruct/drift_kriging.h"
 #include "variolux/reconstruct/mean.h"

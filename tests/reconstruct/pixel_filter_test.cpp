@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "rebin.h"
+#include "reconstruct/common/rebin.h"
 
 namespace vlx {
 namespace {

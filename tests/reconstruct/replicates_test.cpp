@@ -3,7 +3,7 @@
 #include <random>
 
 #include "../base/temporary_folder.h"
-#include "rebin.h"
+#include "reconstruct/common/rebin.h"
 #include "variolux/dump/writer.h"
 #include "variolux/reconstruct/drift_kriging.h"
 #include "variolux/reconstruct/mean.h"

@@ -1,10 +1,10 @@
-#include "stacking.h"
+#include "reconstruct/drift/stacking.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "patch_similarity.h"
+#include "reconstruct/drift/patch_similarity.h"
 
 namespace vlx {
 namespace {

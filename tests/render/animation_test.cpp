@@ -3,10 +3,10 @@
 #include <functional>
 
 #include "../base/temporary_folder.h"
-#include "accelerator.h"
 #include "gltf_text.h"
-#include "plan.h"
-#include "scene_loader.h"
+#include "render/plan/plan.h"
+#include "render/scene/accelerator.h"
+#include "render/scene/scene_loader.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {

@@ -1,12 +1,12 @@
-#include "append.h"
+#include "render/film/append.h"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
 #include "../base/temporary_folder.h"
-#include "pilot.h"
-#include "render.h"
+#include "render/film/render.h"
+#include "render/pilot/pilot.h"
 #include "test_scene.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"

@@ -1,4 +1,4 @@
-#include "bidirectional.h"
+#include "render/integrator/bidirectional.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "bsdf.h"
+#include "render/surface/bsdf.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sampling.h"
+#include "render/math/sampling.h"
 
 namespace vlx::render {
 namespace {

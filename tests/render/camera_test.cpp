@@ -1,4 +1,4 @@
-#include "camera.h"
+#include "render/scene/camera.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "bidirectional.h"
+#include "render/integrator/bidirectional.h"
 #include "test_scene.h"
 #include "variolux/base/hash.h"
 

@@ -5,7 +5,7 @@
 
 #include "../base/temporary_folder.h"
 #include "gltf_text.h"
-#include "scene_loader.h"
+#include "render/scene/scene_loader.h"
 #include "variolux/base/error.h"
 
 /// Scenes of which a reader would take something in silence, or speak of something else.

@@ -2,10 +2,10 @@
 
 #include <array>
 
-#include "accelerator.h"
-#include "path_tracer.h"
-#include "region_sampling.h"
-#include "scene_loader.h"
+#include "render/film/region_sampling.h"
+#include "render/integrator/path_tracer.h"
+#include "render/scene/accelerator.h"
+#include "render/scene/scene_loader.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/parallel.h"
 

@@ -1,8 +1,8 @@
-#include "light_tree.h"
+#include "render/light/light_tree.h"
 
 #include <gtest/gtest.h>
 
-#include "light_sampler.h"
+#include "render/light/light_sampler.h"
 #include "test_scene.h"
 
 namespace vlx::render {

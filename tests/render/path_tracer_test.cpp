@@ -1,4 +1,4 @@
-#include "path_tracer.h"
+#include "render/integrator/path_tracer.h"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
-#include "plan.h"
+#include "render/plan/plan.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
 #include "../base/temporary_folder.h"
-#include "append.h"
-#include "camera.h"
-#include "effect_counters.h"
-#include "render.h"
+#include "render/film/append.h"
+#include "render/film/render.h"
+#include "render/plan/effect_counters.h"
+#include "render/scene/camera.h"
 #include "test_scene.h"
 
 namespace vlx::render {

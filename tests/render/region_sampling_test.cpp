@@ -1,4 +1,4 @@
-#include "region_sampling.h"
+#include "render/film/region_sampling.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <set>
 #include <tuple>
 
-#include "sampling.h"
+#include "render/math/sampling.h"
 #include "variolux/base/hash.h"
 
 namespace vlx::render {

@@ -1,4 +1,4 @@
-#include "render.h"
+#include "render/film/render.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <map>
 
 #include "../base/temporary_folder.h"
-#include "choose_integrator.h"
+#include "render/pilot/choose_integrator.h"
 #include "test_scene.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/reader.h"

@@ -1,4 +1,4 @@
-#include "scene_loader.h"
+#include "render/scene/scene_loader.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <limits>
 
 #include "../base/temporary_folder.h"
-#include "accelerator.h"
-#include "gltf_references.h"
 #include "gltf_text.h"
+#include "render/gltf/gltf_references.h"
+#include "render/scene/accelerator.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 

@@ -2,9 +2,9 @@
 
 #include <array>
 
-#include "path_tracer.h"
-#include "scene.h"
-#include "scene_loader.h"
+#include "render/integrator/path_tracer.h"
+#include "render/scene/scene.h"
+#include "render/scene/scene_loader.h"
 
 namespace vlx::render {
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 namespace vlx {
 
@@ -16,6 +17,12 @@ struct Window {
     bool contains(int px, int py) const { return px >= x && px - x < width && py >= y && py - y < height; }
     bool operator==(const Window&) const = default;
 };
+
+/// "4 x 3 pixels at (0, 0)".
+inline std::string windowText(const Window& window) {
+    return std::to_string(window.width) + " x " + std::to_string(window.height) + " pixels at (" +
+           std::to_string(window.x) + ", " + std::to_string(window.y) + ")";
+}
 
 /// Coordinates of pixels are at most this far from 0: OpenEXR takes no others, and sums of two fit an int.
 inline constexpr int kMostCoordinate = 0x3ffffffe;

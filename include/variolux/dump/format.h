@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -7,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "variolux/base/channel_type.h"
 #include "variolux/base/window.h"
 
 namespace vlx {
@@ -14,16 +16,10 @@ namespace vlx {
 /// Version written into variolux:version. Readers accept any; a change of meaning raises it.
 inline constexpr int kDumpVersion = 1;
 
-/// How a channel is stored. In memory every channel is float: HALF widens exactly, UINT is exact to 2^24.
-enum class ChannelType { Half, Float, Uint };
-
 struct DumpChannel {
     std::string name;
     ChannelType type = ChannelType::Float;
 };
-
-/// The lossless compressions that OpenEXR allows in deep files.
-enum class DumpCompression { None, Rle, Zips };
 
 /// What a dump's header says: everything but the samples. The format is specified in the README.
 struct DumpHeader {
@@ -63,6 +59,24 @@ std::optional<std::uint32_t> replicateNumber(float value);
 
 /// Lets `header` say what the dump is made of (kInputsAttribute of base/image_io.h): nothing when empty.
 void setInputs(DumpHeader& header, const std::string& inputs);
+
+/// The three colours, or coordinates, of a layer among `names`: layer.R .G .B, or .r .g .b, .X .Y .Z,
+/// .x .y .z; without a layer's name and its dot when `layer` is empty.
+std::optional<std::array<std::string, 3>> layerTriple(const std::vector<std::string>& names,
+                                                      const std::string& layer);
+
+/// Channels that `name` stands for among `names`: the channel of this name, or the layerTriple() of this
+/// name. Empty when there are none.
+std::vector<std::string> radianceChannels(const std::vector<std::string>& names, const std::string& name);
+
+/// Something a dump lacks, and what that costs the reconstruction.
+struct MissingPart {
+    std::string what;  ///< for example "sample positions (sample.x, sample.y)"
+    std::string cost;  ///< one sentence for a person
+};
+
+/// Channels and attributes that a dump with this header lacks, in the order of their use.
+std::vector<MissingPart> missingChannels(const DumpHeader& header);
 
 /// Position of a channel in `header`, or -1.
 int findChannel(const DumpHeader& header, std::string_view name);

@@ -1,0 +1,265 @@
+#include "exr/flat_images.h"
+
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <bit>
+#include <filesystem>
+#include <limits>
+
+#include "exr/flat_header.h"
+#include "variolux/base/error.h"
+#include "variolux/base/parallel.h"
+
+namespace vlx {
+
+namespace {
+
+// More files than this are opened anew for every band: systems allow 1024 open files, often fewer.
+constexpr std::size_t kOpenImages = 200;
+// Values of all images together in a band, at four bytes, twice.
+constexpr std::size_t kBandValues = std::size_t{8} << 20;
+constexpr int kMaxBandRows = 32;
+// Values of a row of one image, or of a row of its tiles.
+constexpr std::int64_t kMaxStripValues = std::int64_t{1} << 28;
+
+std::string reason(std::string own) {
+    if (own.empty()) own = OIIO::geterror();
+    while (!own.empty() && own.back() == '\n') own.pop_back();
+    return own.empty() ? "unknown reason" : own;
+}
+
+void checkRowLength(const std::string& path, const OIIO::ImageSpec& spec) {
+    const std::int64_t rows = std::max(spec.tile_height, 1);
+    if (std::int64_t{spec.width} * spec.nchannels * rows > kMaxStripValues)
+        throw Error(path, "expected rows of at most 2^28 values, found " + std::to_string(spec.width) +
+                              " pixels of " + std::to_string(spec.nchannels) + " channels");
+}
+
+std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
+    std::error_code status;
+    if (!std::filesystem::is_regular_file(path, status))
+        throw Error(path, "expected an image, found no such file");
+    checkFlatHeader(path);
+    auto input = OIIO::ImageInput::open(path);
+    if (!input) throw Error(path, "expected an image: " + reason({}));
+    const OIIO::ImageSpec& spec = input->spec();
+    if (spec.deep) throw Error(path, "expected a flat image, found deep samples: this is a dump already");
+    if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 || spec.depth > 1)
+        throw Error(path, "expected a flat image with pixels and channels, found none");
+    checkRowLength(path, spec);
+    return input;
+}
+
+Window dataWindow(const OIIO::ImageSpec& spec) { return {spec.x, spec.y, spec.width, spec.height}; }
+Window displayWindow(const OIIO::ImageSpec& spec) {
+    return {spec.full_x, spec.full_y, spec.full_width, spec.full_height};
+}
+
+}  // namespace
+
+std::string listed(const std::vector<std::string>& names) {
+    std::string text;
+    for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+    return text;
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+std::string partChannel(int part, const std::string& partName, const std::string& channel) {
+    if (part == 0 || partName.empty() || channel.starts_with(partName + ".")) return channel;
+    return partName + "." + channel;
+}
+
+// What is taken from one part of an image, in rows of interleaved values.
+class FlatPart {
+  public:
+    FlatPart(int number, const OIIO::ImageSpec& spec) : number_(number), spec_(spec) {}
+
+    const OIIO::ImageSpec& spec() const { return spec_; }
+
+    void take(int channel) {
+        begin_ = std::min(begin_, channel);
+        end_ = std::max(end_, channel + 1);
+    }
+
+    // Returns whether all went well.
+    bool read(OIIO::ImageInput& input, int y, int rows) {
+        if (begin_ >= end_) return true;
+        values_.resize(rowValues() * static_cast<std::size_t>(rows));
+        return spec_.tile_width > 0 ? readTiles(input, y, rows)
+                                    : input.read_scanlines(number_, 0, y, y + rows, 0, begin_, end_,
+                                                           OIIO::TypeDesc::FLOAT, values_.data());
+    }
+
+    const std::vector<float>& values() const { return values_; }
+
+    float value(std::size_t pixel, int channel) const {
+        return values_[pixel * static_cast<std::size_t>(end_ - begin_) +
+                       static_cast<std::size_t>(channel - begin_)];
+    }
+
+  private:
+    std::size_t rowValues() const {
+        return static_cast<std::size_t>(spec_.width) * static_cast<std::size_t>(end_ - begin_);
+    }
+
+    // Tiles come in whole rows of tiles; the one read last is kept for the next band.
+    bool readTiles(OIIO::ImageInput& input, int y, int rows) {
+        for (int row = y; row < y + rows; ++row) {
+            const int first = row - (row - spec_.y) % spec_.tile_height;
+            const int last = std::min(first + spec_.tile_height, spec_.y + spec_.height);
+            if (first != stripBegin_) {
+                strip_.resize(rowValues() * static_cast<std::size_t>(last - first));
+                stripBegin_ = std::numeric_limits<int>::min();
+                if (!input.read_tiles(number_, 0, spec_.x, spec_.x + spec_.width, first, last, 0, 1, begin_,
+                                      end_, OIIO::TypeDesc::FLOAT, strip_.data()))
+                    return false;
+                stripBegin_ = first;
+            }
+            std::copy_n(strip_.begin() + static_cast<std::ptrdiff_t>(rowValues()) * (row - first),
+                        rowValues(), values_.begin() + static_cast<std::ptrdiff_t>(rowValues()) * (row - y));
+        }
+        return true;
+    }
+
+    int number_;
+    OIIO::ImageSpec spec_;
+    int begin_ = std::numeric_limits<int>::max();
+    int end_ = 0;
+    std::vector<float> values_;
+    std::vector<float> strip_;
+    int stripBegin_ = std::numeric_limits<int>::min();
+};
+
+class FlatImages::Source {
+  public:
+    Source(std::string path, bool keepOpen) : path_(std::move(path)), keepOpen_(keepOpen) {
+        auto input = vlx::open(path_);
+        for (int number = 0; input->seek_subimage(number, 0); ++number) {
+            const OIIO::ImageSpec spec = input->spec();
+            if (number > 0 && (spec.deep || dataWindow(spec) != dataWindow(parts_.front().spec()) ||
+                               spec.nchannels <= 0 || spec.depth > 1))
+                continue;
+            if (number > 0) checkRowLength(path_, spec);
+            const std::string name(spec.get_string_attribute("oiio:subimagename"));
+            for (int channel = 0; channel < spec.nchannels; ++channel) {
+                std::string known =
+                    partChannel(number, name, spec.channelnames[static_cast<std::size_t>(channel)]);
+                if (contains(names_, known)) continue;
+                names_.push_back(std::move(known));
+                places_.push_back({parts_.size(), channel});
+            }
+            parts_.emplace_back(number, spec);
+        }
+        static_cast<void>(input->geterror());  // there is no further part: not an error
+        input->seek_subimage(0, 0);
+        if (keepOpen_) input_ = std::move(input);
+    }
+
+    std::size_t take(const std::string& name) {
+        const auto found = std::find(names_.begin(), names_.end(), name);
+        if (found == names_.end())
+            throw Error(path_, "expected a channel " + name + ", found " + listed(names_));
+        taken_.push_back(places_[static_cast<std::size_t>(found - names_.begin())]);
+        parts_[taken_.back().part].take(taken_.back().channel);
+        return taken_.size() - 1;
+    }
+
+    void read(int y, int rows) {
+        if (taken_.empty()) return;
+        auto input = keepOpen_ ? std::move(input_) : vlx::open(path_);
+        for (FlatPart& part : parts_) {
+            if (!part.read(*input, y, rows))
+                throw Error(path_, "rows " + std::to_string(y) + " to " + std::to_string(y + rows - 1) +
+                                       ": " + reason(input->geterror()));
+            for (const float value : part.values())
+                hash_ = (hash_ ^ std::bit_cast<std::uint32_t>(value)) * 1099511628211u;
+        }
+        if (keepOpen_) input_ = std::move(input);
+    }
+
+    float value(std::size_t pixel, std::size_t index) const {
+        return parts_[taken_[index].part].value(pixel, taken_[index].channel);
+    }
+    const std::string& path() const { return path_; }
+    const OIIO::ImageSpec& spec() const { return parts_.front().spec(); }
+    const std::vector<std::string>& names() const { return names_; }
+    Window data() const { return dataWindow(spec()); }
+    Window display() const { return displayWindow(spec()); }
+    std::uint64_t hash() const { return hash_; }
+
+  private:
+    struct Place {
+        std::size_t part = 0;
+        int channel = 0;
+    };
+
+    std::string path_;
+    bool keepOpen_;
+    std::unique_ptr<OIIO::ImageInput> input_;
+    std::vector<FlatPart> parts_;
+    std::vector<std::string> names_;
+    std::vector<Place> places_;  // of each name
+    std::vector<Place> taken_;
+    std::uint64_t hash_ = 14695981039346656037u;  // of all values read, FNV-1a
+};
+
+FlatImages::FlatImages(std::vector<std::string> paths) {
+    for (auto& path : paths) {
+        sources_.push_back(std::make_unique<Source>(std::move(path), paths.size() <= kOpenImages));
+        const Source& source = *sources_.back();
+        const Source& first = *sources_.front();
+        if (source.data() != first.data() || source.display() != first.display())
+            throw Error(source.path(), "expected the windows of the first image, " +
+                                           windowText(first.data()) + ", found " + windowText(source.data()) +
+                                           " or another picture around it");
+    }
+}
+
+FlatImages::~FlatImages() = default;
+
+std::size_t FlatImages::size() const { return sources_.size(); }
+const std::string& FlatImages::path(std::size_t image) const { return sources_[image]->path(); }
+const std::vector<std::string>& FlatImages::channels(std::size_t image) const {
+    return sources_[image]->names();
+}
+Window FlatImages::data() const { return sources_.front()->data(); }
+Window FlatImages::display() const { return sources_.front()->display(); }
+
+std::string FlatImages::text(std::size_t image, const std::string& attribute) const {
+    return std::string(sources_[image]->spec().get_string_attribute(attribute));
+}
+
+std::optional<double> FlatImages::number(std::size_t image, const std::string& attribute) const {
+    const OIIO::ParamValue* found = sources_[image]->spec().find_attribute(attribute);
+    if (found == nullptr || found->type().aggregate != OIIO::TypeDesc::SCALAR ||
+        found->type().basetype == OIIO::TypeDesc::STRING)
+        return std::nullopt;
+    return found->get_float();
+}
+
+FlatChannel FlatImages::take(std::size_t image, const std::string& channel) {
+    return {image, sources_[image]->take(channel)};
+}
+
+int FlatImages::bandRows(std::size_t values) const {
+    const std::size_t row = static_cast<std::size_t>(data().width) * std::max<std::size_t>(values, 1);
+    return static_cast<int>(
+        std::clamp<std::size_t>(kBandValues / row, 1, static_cast<std::size_t>(kMaxBandRows)));
+}
+
+void FlatImages::read(int y, int rows) {
+    parallelFor(0, static_cast<std::int64_t>(sources_.size()),
+                [&](std::int64_t i) { sources_[static_cast<std::size_t>(i)]->read(y, rows); });
+}
+
+float FlatImages::value(FlatChannel channel, std::size_t pixel) const {
+    return sources_[channel.image]->value(pixel, channel.index);
+}
+
+std::uint64_t FlatImages::hash(std::size_t image) const { return sources_[image]->hash(); }
+
+}  // namespace vlx

@@ -1,0 +1,128 @@
+#include "reconstruct/common/picture_scale.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "reconstruct/common/rebin.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr int kRows = 16;
+
+/// Sums over rows of pixels.
+class Sums {
+  public:
+    explicit Sums(int width) {
+        for (int lag = 1; lag < width; lag *= 2) lags_.push_back(lag);
+        pairs_.resize(lags_.size());
+        for (auto& products : products_) products.resize(lags_.size());
+    }
+
+    void add(const RowRing& row, const GatheredPlanes& planes, int width) {
+        const auto at = [&](int plane, int x) { return static_cast<double>(row.row(plane, 0)[x]); };
+        const auto half = [&](int h, int c, int x) {  // a half without samples has the other's mean
+            const bool own = at(h == 0 ? planes.countA : planes.countB, x) > 0;
+            return at(((h == 0) == own ? planes.meanA : planes.meanB) + c, x);
+        };
+        for (int x = 0; x < width; ++x) {
+            const double n = at(planes.count, x);
+            if (n == 0) continue;
+            samples_ += n;
+            freedom_ += at(planes.freedom, x);
+            for (int c = 0; c < 3; ++c) {
+                radiance_[c] += at(planes.countA, x) * at(planes.meanA + c, x) +
+                                at(planes.countB, x) * at(planes.meanB + c, x);
+                if (at(planes.freedom, x) > 0) squares_[c] += at(planes.squares + c, x);
+            }
+            for (std::size_t k = 0; k < lags_.size(); ++k) {
+                const int to = x + lags_[k];
+                if (to >= width || at(planes.count, to) == 0) continue;
+                ++pairs_[k];
+                for (int c = 0; c < 3; ++c)
+                    products_[c][k] +=
+                        (half(0, c, to) - half(0, c, x)) * (half(1, c, to) - half(1, c, x)) / 2;
+            }
+        }
+    }
+
+    bool light() const { return std::max({radiance_[0], radiance_[1], radiance_[2]}) > 0; }
+
+    PictureScale scale() const {
+        PictureScale scale;
+        if (light()) scale.level = std::max({radiance_[0], radiance_[1], radiance_[2]}) / samples_;
+        const bool paired = std::any_of(pairs_.begin(), pairs_.end(), [](double pairs) { return pairs > 0; });
+        for (int c = 0; c < 3; ++c) {
+            if (!paired) {  // how neighbours differ is not known: as much as the light itself
+                scale.semivariance[c].assign(1, scale.level * scale.level);
+                scale.variance[c] =
+                    std::max(unseenVariance(samples_, scale.level),
+                             freedom_ > 0 ? squares_[c] / freedom_ : scale.level * scale.level);
+                continue;
+            }
+            double most = 0;
+            for (std::size_t k = 0; k < lags_.size(); ++k) {
+                if (pairs_[k] > 0) most = std::max(most, products_[c][k] / pairs_[k]);
+                scale.semivariance[c].push_back(most);
+            }
+            double variance = 0;
+            if (freedom_ > 0)
+                variance = squares_[c] / freedom_;
+            else
+                for (std::size_t k = 0; k < lags_.size() && variance == 0; ++k)
+                    variance = scale.semivariance[c][k];
+            scale.variance[c] = std::max(variance, unseenVariance(samples_, scale.level));
+        }
+        return scale;
+    }
+
+  private:
+    std::vector<int> lags_;
+    std::vector<double> pairs_, products_[3];
+    double radiance_[3] = {}, squares_[3] = {}, samples_ = 0, freedom_ = 0;
+};
+
+}  // namespace
+
+double PictureScale::agreedDeviation(double value, double samples) const {
+    return std::sqrt(unseenVariance(samples, std::max(std::abs(value), level)) / std::max(1.0, samples));
+}
+
+double PictureScale::unknownDeviation(int c) const {
+    return std::sqrt(level * level + semivariance[c].back());
+}
+
+double PictureScale::semivarianceAt(int c, double pixels) const {
+    const std::vector<double>& values = semivariance[c];
+    const double place = std::log2(std::max(1.0, pixels));
+    const auto below = std::min(values.size() - 1, static_cast<std::size_t>(place));
+    const auto above = std::min(values.size() - 1, below + 1);
+    const double share = std::min(1.0, place - static_cast<double>(below));
+    return (1 - share) * values[below] + share * values[above];
+}
+
+PictureScale measurePictureScale(const SampleSource& dump) {
+    return measurePictureScale(dump, chooseSampleLayout(dump, {.standardFeatures = false}));
+}
+
+PictureScale measurePictureScale(const SampleSource& dump, const SampleLayout& layout) {
+    const DumpHeader& header = dump.header();
+    const GatheredPlanes planes(layout);
+    RowRing ring(header.data.width, planes.channels, 1);
+    const auto sumsOf = [&](int rows) {
+        Sums sums(header.data.width);
+        for (int i = 0; i < rows; ++i) {
+            const auto row =
+                static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(header.data.height) / (2 * rows));
+            gatherRow(readRows(dump, layout, 1, row, 1), layout, planes, 0, 0, ring, 0);
+            sums.add(ring, planes, header.data.width);
+        }
+        return sums;
+    };
+    const Sums sums = sumsOf(std::min(kRows, header.data.height));
+    return sums.light() || header.data.height <= kRows ? sums.scale() : sumsOf(header.data.height).scale();
+}
+
+}  // namespace vlx

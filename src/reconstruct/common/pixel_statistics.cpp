@@ -1,0 +1,313 @@
+#include "reconstruct/common/pixel_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "variolux/base/error.h"
+#include "variolux/base/hash.h"
+#include "variolux/dump/format.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr int kScaleRows = 16;
+constexpr double kScalePercentile = 0.99;
+constexpr float kMedians = 4;  // of a feature's magnitude: its scale, at most
+
+void addFeatures(const DumpHeader& header, const std::vector<std::string>& channels, SampleLayout& layout) {
+    for (const std::string& channel : channels)
+        if (findChannel(header, channel) < 0) return;
+    for (const std::string& channel : channels) {
+        layout.names.push_back(channel);
+        layout.group.push_back(layout.groups);
+        layout.scale.push_back(1);
+        ++layout.features;
+    }
+    ++layout.groups;
+}
+
+void requireChannel(const SampleSource& dump, const SampleLayout& layout, const std::string& channel) {
+    if (findChannel(dump.header(), channel) < 0)
+        throw Error(dump.path(),
+                    "expected a channel '" + channel +
+                        "' (of --feature, --radiance, or of --scale, which needs positions), found "
+                        "none of that name");
+    if (std::find(layout.names.begin(), layout.names.end(), channel) != layout.names.end())
+        throw Error(
+            dump.path(),
+            "channel '" + channel + "' is used already and cannot be named again by --feature or --radiance");
+}
+
+/// Sums of squares of such radiances are finite floats still; no light is as bright.
+constexpr float kMostRadiance = 0x1p50f;
+
+/// Whether the radiance of a sample is finite and at most kMostRadiance, its channels those from `first` on;
+/// alpha is none.
+bool usable(const SampleBand& band, const SampleLayout& layout, std::size_t first, std::size_t sample) {
+    for (int c = 0; c < layout.radiance; ++c)
+        if (c != layout.alpha &&
+            !(std::abs(band.values[first + static_cast<std::size_t>(c)][sample]) <= kMostRadiance))
+            return false;
+    return true;
+}
+
+/// 99th percentiles of the magnitudes of features `first` and on, over rows spread evenly.
+void measureScales(const SampleSource& dump, SampleLayout& layout, std::size_t first) {
+    const std::size_t measured = layout.scale.size() - first;
+    if (measured == 0) return;
+    std::vector<std::string> channels(
+        layout.names.begin() + layout.radiance + static_cast<std::ptrdiff_t>(first),
+        layout.names.begin() + layout.radiance + layout.features);
+    // Radiance too: samples that are dropped say nothing about features either.
+    channels.insert(channels.end(), layout.names.begin(), layout.names.begin() + layout.radiance);
+    std::vector<std::vector<float>> magnitudes(measured);
+    const Window& window = dump.header().data;
+    const int rows = std::min(kScaleRows, window.height);
+    for (int i = 0; i < rows; ++i) {
+        const auto row =
+            static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(window.height) / (2 * rows));
+        const SampleBand band = dump.read(window.y + row, 1, channels);
+        for (std::size_t s = 0; s < band.samples(); ++s) {
+            if (!usable(band, layout, measured, s)) continue;
+            for (std::size_t c = 0; c < measured; ++c)
+                if (const float value = band.values[c][s]; std::isfinite(value))
+                    magnitudes[c].push_back(std::abs(value));
+        }
+    }
+    for (std::size_t c = 0; c < measured; ++c) {
+        std::vector<float>& values = magnitudes[c];
+        if (values.empty()) continue;
+        const auto percentile = [&](double share) {
+            const auto nth =
+                values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+            std::nth_element(values.begin(), nth, values.end());
+            return *nth;
+        };
+        const float most = percentile(kScalePercentile), median = percentile(0.5);
+        const float scale = median > 0 ? std::min(most, kMedians * median) : most;
+        if (scale > 0) layout.scale[first + c] = scale;
+    }
+}
+
+/// Whether every sample says how uncertain it is.
+bool varianceKnown(const SampleBand& band, const SampleLayout& layout,
+                   const std::vector<std::size_t>& samples) {
+    if (layout.variance < 0 || samples.empty()) return false;
+    for (std::size_t c = 0; c < 3; ++c)
+        for (const std::size_t s : samples) {
+            const float v = band.values[static_cast<std::size_t>(layout.variance) + c][s];
+            if (!(v >= 0 && v <= kMostRadiance * kMostRadiance)) return false;
+        }
+    return true;
+}
+
+/// The sum of squares that as many samples with the same error of their mean would have: the mean of samples
+/// with error variances v has sum v / n^2; that is S / (n (n - 1)), with S / 1 for one sample.
+double knownSquares(const SampleBand& band, const SampleLayout& layout,
+                    const std::vector<std::size_t>& samples, std::size_t c) {
+    double sum = 0;
+    for (const std::size_t s : samples)
+        sum += static_cast<double>(band.values[static_cast<std::size_t>(layout.variance) + c][s]);
+    const auto n = static_cast<double>(samples.size());
+    return sum / n * std::max(1.0, n - 1);
+}
+
+}  // namespace
+
+std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options) {
+    std::vector<std::string> names, further;
+    for (const DumpChannel& channel : header.channels) names.push_back(channel.name);
+    for (const std::string& wanted : options.radiance) {
+        const std::vector<std::string> channels = radianceChannels(names, wanted);
+        if (channels.empty()) further.push_back(wanted);  // chooseSampleLayout() says what is wrong
+        further.insert(further.end(), channels.begin(), channels.end());
+    }
+    return further;
+}
+
+SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOptions& options) {
+    const DumpHeader& header = dump.header();
+    SampleLayout layout;
+    layout.names = {"R", "G", "B"};
+    if (findChannel(header, "A") >= 0) {
+        layout.alpha = static_cast<int>(layout.names.size());
+        layout.names.emplace_back("A");
+    }
+    for (const std::string& channel : furtherRadiance(header, options)) {
+        requireChannel(dump, layout, channel);
+        layout.names.push_back(channel);
+    }
+    layout.radiance = static_cast<int>(layout.names.size());
+    if (options.standardFeatures) {
+        addFeatures(header, {"albedo.R", "albedo.G", "albedo.B"}, layout);
+        addFeatures(header, {"N.X", "N.Y", "N.Z"}, layout);
+    }
+    const std::size_t first = layout.scale.size();
+    if (options.standardFeatures) addFeatures(header, {"Z"}, layout);
+    for (const std::string& channel : options.features) {
+        requireChannel(dump, layout, channel);
+        addFeatures(header, {channel}, layout);
+    }
+    measureScales(dump, layout, first);
+    if (findChannel(header, "sample.replicate") >= 0) {
+        layout.replicate = static_cast<int>(layout.names.size());
+        layout.names.emplace_back("sample.replicate");
+    }
+    if (options.scale > 1) {
+        for (const char* channel : {"sample.x", "sample.y"}) requireChannel(dump, layout, channel);
+        layout.position = static_cast<int>(layout.names.size());
+        layout.names.insert(layout.names.end(), {"sample.x", "sample.y"});
+    }
+    if (std::all_of(
+            std::begin(kVarianceChannels), std::end(kVarianceChannels),
+            [&](std::string_view channel) { return findChannel(header, std::string(channel)) >= 0; })) {
+        layout.variance = static_cast<int>(layout.names.size());
+        layout.names.insert(layout.names.end(), std::begin(kVarianceChannels), std::end(kVarianceChannels));
+    }
+    return layout;
+}
+
+GatheredPlanes::GatheredPlanes(const SampleLayout& layout)
+    : radiance(layout.radiance), features(layout.features) {
+    int next = 0;
+    const auto take = [&](int planes) {
+        const int first = next;
+        next += planes;
+        return first;
+    };
+    count = take(1);
+    countA = take(1);
+    countB = take(1);
+    meanA = take(radiance);
+    meanB = take(radiance);
+    squares = take(3);
+    freedom = take(1);
+    stated = take(1);
+    feature = take(features);
+    featureError = take(features);
+    brightest = take(radiance);
+    brightestLuminance = take(1);
+    secondLuminance = take(1);
+    brightestHalf = take(1);
+    channels = next;
+}
+
+float saturated(float value) {
+    const float magnitude = std::abs(value);
+    return magnitude > 1 ? std::copysign(1 + std::log(magnitude), value) : value;
+}
+
+GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
+                       int bandRow, double clamp, RowRing& ring, int y) {
+    GatherCounts counts;
+    const auto radiance = static_cast<std::size_t>(layout.radiance);
+    const auto features = static_cast<std::size_t>(layout.features);
+    std::vector<double> first(radiance + features), sum[2], square(radiance + features);
+    const std::size_t alpha = layout.alpha < 0 ? radiance + features : static_cast<std::size_t>(layout.alpha);
+    std::vector<std::size_t> taken, halves[2];
+    std::vector<std::pair<std::uint64_t, std::size_t>> order;
+    int singles = y;  // pixels of one sample so far, the first of them in half A or B by turns
+    for (int x = 0; x < band.width; ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(bandRow) * static_cast<std::size_t>(band.width) +
+                                  static_cast<std::size_t>(x);
+        taken.clear();
+        for (std::size_t s = band.offsets[pixel]; s < band.offsets[pixel + 1]; ++s) {
+            ++counts.samples;
+            if (usable(band, layout, 0, s))
+                taken.push_back(s);
+            else
+                ++counts.dropped;
+        }
+        halves[0].clear();
+        halves[1].clear();
+        if (layout.replicate >= 0)
+            for (const std::size_t s : taken)
+                halves[replicateNumber(band.values[static_cast<std::size_t>(layout.replicate)][s]).value() %
+                       2]
+                    .push_back(s);
+        if (halves[0].empty() || halves[1].empty()) {  // no replicates, or only one
+            order.clear();
+            for (std::size_t i = 0; i < taken.size(); ++i)
+                order.emplace_back(hashOf(x, y, static_cast<std::int64_t>(i)), taken[i]);
+            std::sort(order.begin(), order.end());
+            halves[0].clear();
+            halves[1].clear();
+            const std::size_t startHalf = taken.size() == 1 ? static_cast<std::size_t>(singles++) % 2 : 0;
+            for (std::size_t i = 0; i < order.size(); ++i)
+                halves[(startHalf + i) % 2].push_back(order[i].second);
+        }
+        const auto n = static_cast<double>(taken.size());
+        if (taken.empty()) ++counts.empty;
+
+        std::fill(square.begin(), square.end(), 0.0);
+        for (auto& s : sum) s.assign(radiance + features, 0.0);
+        double rgb[3] = {};
+        std::size_t bright = 0;
+        float most = -1, second = -1;
+        int brightHalf = 0;
+        const auto value = [&](std::size_t c, std::size_t s) {
+            const float v = band.values[c][s];
+            if (!std::isfinite(v)) return 0.0;
+            return static_cast<double>(c < radiance ? v : saturated(v / layout.scale[c - radiance]));
+        };
+        for (std::size_t c = 0; c < radiance + features; ++c)
+            first[c] = taken.empty() ? 0 : value(c, taken[0]);
+        for (int half = 0; half < 2; ++half)
+            for (const std::size_t s : halves[half]) {
+                for (std::size_t c = 0; c < 3; ++c) rgb[c] = value(c, s);
+                const double brightness = luminance(rgb);
+                const double factor = clamp > 0 && brightness > clamp ? clamp / brightness : 1;
+                counts.luminance += brightness;
+                counts.removed += brightness * (1 - factor);
+                counts.limited += factor < 1;
+                for (std::size_t c = 0; c < radiance + features; ++c) {
+                    const double d = value(c, s) * (c < radiance && c != alpha ? factor : 1) - first[c];
+                    sum[half][c] += d;
+                    square[c] += d * d;
+                }
+                const auto l = static_cast<float>(brightness * factor);
+                if (l > most) {
+                    second = most;
+                    most = l;
+                    bright = s;
+                    brightHalf = half;
+                } else {
+                    second = std::max(second, l);
+                }
+            }
+
+        const bool known = varianceKnown(band, layout, taken);
+        const auto put = [&](int plane, double v) { ring.row(plane, y)[x] = static_cast<float>(v); };
+        const auto nA = static_cast<double>(halves[0].size());
+        const auto nB = static_cast<double>(halves[1].size());
+        put(planes.count, n);
+        put(planes.countA, nA);
+        put(planes.countB, nB);
+        put(planes.stated, known);
+        put(planes.freedom, known ? std::max(1.0, n - 1) : std::max(0.0, n - 1));
+        for (std::size_t c = 0; c < radiance; ++c) {
+            const double a = nA > 0 ? first[c] + sum[0][c] / nA : 0;
+            put(planes.meanA + static_cast<int>(c), a);
+            put(planes.meanB + static_cast<int>(c), nB > 0 ? first[c] + sum[1][c] / nB : 0);
+        }
+        for (std::size_t c = 0; c < radiance + features; ++c) {
+            const double total = sum[0][c] + sum[1][c];
+            double squares = n > 0 ? std::max(0.0, square[c] - total * total / n) : 0;
+            if (c < 3 && known) squares = knownSquares(band, layout, taken, c);
+            if (c < 3) put(planes.squares + static_cast<int>(c), squares);
+            if (c < radiance) continue;
+            const int f = static_cast<int>(c - radiance);
+            put(planes.feature + f, n > 0 ? first[c] + total / n : 0);
+            put(planes.featureError + f, n > 1 ? squares / (n * (n - 1)) : 0);
+        }
+        for (std::size_t c = 0; c < radiance; ++c)
+            put(planes.brightest + static_cast<int>(c), taken.empty() ? 0 : value(c, bright));
+        put(planes.brightestLuminance, std::max(0.f, most));
+        put(planes.secondLuminance, std::max(0.f, second));
+        put(planes.brightestHalf, brightHalf);
+    }
+    return counts;
+}
+
+}  // namespace vlx

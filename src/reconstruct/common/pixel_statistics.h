@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "reconstruct/common/row_ring.h"
+#include "variolux/dump/band.h"
+#include "variolux/dump/format.h"
+#include "variolux/dump/sample_source.h"
+#include "variolux/reconstruct/drift_kriging.h"
+
+/// What the default method knows of a pixel: moments of its samples, gathered in one pass over the dump.
+namespace vlx {
+
+/// The channels of a dump by their roles.
+struct SampleLayout {
+    std::vector<std::string> names;  ///< channels to read, in this order
+    int radiance = 0;                ///< the first ones: R, G, B, then others with the same weights
+    int alpha = -1;                  ///< index of A in `names`: no radiance to limit
+    int features = 0;                ///< the next ones
+    std::vector<int> group;          ///< of each feature; components of one vector share a group
+    std::vector<float> scale;        ///< of each feature: what is stored is feature / scale
+    int groups = 0;
+    int replicate = -1;  ///< index in `names`
+    int position = -1;   ///< index in `names` of sample.x, sample.y after it; where they are needed
+    int variance = -1;   ///< index in `names` of the first of kVarianceChannels, all three of which are there
+};
+
+/// Of linear R, G, B with the primaries of Rec. 709; not negative.
+inline float luminance(const double* rgb) {
+    const double y = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    return static_cast<float>(y > 0 ? y : 0);
+}
+
+/// The channels that options.radiance stands for.
+std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options);
+
+/// Finds the roles. Albedo and normals are of order 1 by definition; the scale of depth and of named features
+/// is the 99th percentile of their magnitude, at most 4 medians (a background's depth has no bounds), in 16
+/// rows spread over the image (the same rows whatever band of the image is reconstructed). Features that are
+/// constant in these rows stay: they cost little. Throws Error when a named channel is missing or is R, G or
+/// B.
+SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOptions& options);
+
+/// Planes of the statistics of rows of pixels, as gathered.
+struct GatheredPlanes {
+    explicit GatheredPlanes(const SampleLayout& layout);
+
+    int radiance, features;
+    // Indices of planes.
+    int count;                  ///< usable samples
+    int countA, countB;         ///< of each half
+    int meanA, meanB;           ///< radiance channels: mean of each half (0 where it has no sample)
+    int squares;                ///< 3: sum of squared deviations of R, G, B from the pixel's mean
+    int freedom;                ///< degrees of freedom of `squares`
+    int stated;                 ///< 1 where the dump states the error variances of all samples, else 0
+    int feature, featureError;  ///< mean of each feature, and the error variance of that mean
+    int brightest;              ///< radiance channels of the brightest sample
+    int brightestLuminance, secondLuminance, brightestHalf;
+    int channels;
+};
+
+/// What a feature's value counts as, in units of its scale: itself up to 1, and beyond that 1 + ln |x|. A
+/// lamp's albedo of 100 or a sky at depth 1e10 is unlike all else, no more.
+float saturated(float value);
+
+struct GatherCounts {
+    std::int64_t samples = 0, dropped = 0, empty = 0;
+    std::int64_t limited = 0;           ///< samples made darker by the firefly estimator
+    double luminance = 0, removed = 0;  ///< sums over samples
+};
+
+/// Gathers one row (counted from the band's top) into planes of row y.
+///
+/// Halves A and B are the replicates of even and odd number where the dump has replicates, else a random half
+/// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
+/// alike, and may lie on different sides of the pixel. Single samples belong to A and B by turns along a row,
+/// starting with A or B by turns from row to row: a chessboard where every pixel has one. Samples with known
+/// error variances (kVarianceChannels) stand for their own scatter. A sample with radiance that is not
+/// finite, or beyond 2^50, whose squares floats do not hold, is dropped; other values that are not finite
+/// count as 0. Features are saturated(feature / scale), sample by sample. Sums run in double precision about
+/// the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
+GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
+                       int bandRow, double clamp, RowRing& ring, int y);
+
+}  // namespace vlx

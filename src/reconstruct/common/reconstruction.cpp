@@ -1,0 +1,227 @@
+#include "variolux/reconstruct/reconstruction.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace vlx {
+
+namespace {
+
+double perNeighbourhood(const ReconstructionReport& report, double sum) {
+    return report.neighbourhoods > 0 ? sum / static_cast<double>(report.neighbourhoods) : 0;
+}
+
+nlohmann::ordered_json json(const ReconstructionReport& report) {
+    nlohmann::ordered_json regions = nlohmann::ordered_json::object();
+    for (int i = 0; i < kRegionOutcomes; ++i)
+        regions[std::string(name(static_cast<RegionOutcome>(i)))] =
+            report.regions[static_cast<std::size_t>(i)];
+    nlohmann::ordered_json document = {
+        {"samples", report.samples},
+        {"droppedSamples", report.droppedSamples},
+        {"limitedSamples", report.limitedSamples},
+        {"energyRemoved", report.energyRemoved},
+        {"energyReturned", report.energyReturned},
+        {"emptyPixels", report.emptyPixels},
+        {"farPixels", report.farPixels},
+        {"exactPixels", report.exactPixels},
+        {"regions", regions},
+        {"jitteredSystems", report.jitteredSystems},
+        {"inaccuratePixels", report.inaccuratePixels},
+        {"neighbourhoods", report.neighbourhoods},
+        {"ownNeighbourhoods", report.ownNeighbourhoods},
+        {"failedNeighbourhoods", report.failedNeighbourhoods},
+        {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
+        {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
+        {"readSeconds", report.readSeconds},
+        {"solveSeconds", report.solveSeconds}};
+    if (!report.seconds.empty()) document["seconds"] = report.seconds;
+    return document;
+}
+
+/// Five digits: a drawing needs no more, and files stay small.
+nlohmann::ordered_json rounded(double value) {
+    if (!std::isfinite(value)) return nullptr;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.5g", value);
+    return std::strtod(text, nullptr);
+}
+
+std::string_view name(StructureType type) {
+    switch (type) {
+        case StructureType::Spherical:
+            return "spherical";
+        case StructureType::Exponential:
+            return "exponential";
+        case StructureType::Gaussian:
+            return "gaussian";
+        case StructureType::Stable:
+            return "stable";
+        case StructureType::Matern:
+            return "matern";
+        case StructureType::Linear:
+            return "linear";
+    }
+    return "";
+}
+
+nlohmann::ordered_json json(const VariogramModel& model, double reach) {
+    nlohmann::ordered_json document = {{"nugget", rounded(model.nugget)}};
+    auto& structures = document["structures"] = nlohmann::ordered_json::array();
+    for (const VariogramStructure& s : model.structures)
+        structures.push_back({{"type", name(s.type)},
+                              {"sill", rounded(s.sill)},
+                              {"range", rounded(s.range)},
+                              {"shape", rounded(s.shape)}});
+    auto& curve = document["curve"] = nlohmann::ordered_json::array();
+    constexpr int kPoints = 80;
+    for (int i = 0; i <= kPoints; ++i) {
+        const double h = reach * (i + 0.01) / kPoints;  // not 0, where gamma is 0 whatever the nugget
+        curve.push_back({rounded(h), rounded(semivariance(model, h))});
+    }
+    return document;
+}
+
+nlohmann::ordered_json json(const RegionInspection& inspection) {
+    const Window& w = inspection.neighbourhood;
+    nlohmann::ordered_json document = {
+        {"neighbourhood", {{"x", w.x}, {"y", w.y}, {"width", w.width}, {"height", w.height}}},
+        {"distance", inspection.distance},
+        {"pairs", inspection.pairs}};
+    auto& cloud = document["cloud"] = nlohmann::ordered_json::array();
+    for (const auto& [distance, value] : inspection.cloud)
+        cloud.push_back({rounded(distance), rounded(value)});
+    auto& classes = document["classes"] = nlohmann::ordered_json::array();
+    for (const VariogramBin& bin : inspection.classes)
+        classes.push_back({{"distance", rounded(bin.distance)},
+                           {"semivariance", rounded(bin.semivariance)},
+                           {"standardError", rounded(bin.standardError)},
+                           {"pairs", rounded(bin.pairs)}});
+    document["model"] = nullptr;
+    if (!inspection.model.structures.empty())
+        document["model"] =
+            json(inspection.model, inspection.classes.empty() ? 1 : inspection.classes.back().upper);
+    document["crossValidation"] = nullptr;
+    if (const CrossValidation& v = inspection.crossValidation; v.data > 0)
+        document["crossValidation"] = {
+            {"data", v.data}, {"rmse", rounded(v.rmse)}, {"meanSquareScore", rounded(v.meanSquareScore)}};
+    document["fallbacks"] = inspection.fallbacks;
+    return document;
+}
+
+}  // namespace
+
+std::string_view name(RegionOutcome outcome) {
+    switch (outcome) {
+        case RegionOutcome::Kriged:
+            return "kriged";
+        case RegionOutcome::NoStructure:
+            return "no structure";
+        case RegionOutcome::TooFewData:
+            return "too few data";
+        case RegionOutcome::AllEqual:
+            return "all equal";
+        case RegionOutcome::FitFailed:
+            return "fit failed";
+        case RegionOutcome::SolveFailed:
+            return "solve failed";
+        case RegionOutcome::Empty:
+            return "empty";
+    }
+    return "";
+}
+
+constexpr double kMuchLight = 0.1;
+
+std::string toText(const ReconstructionReport& report) {
+    std::ostringstream text;
+    text << report.samples << " samples";
+    if (report.droppedSamples > 0)
+        text << ", " << report.droppedSamples
+             << (report.neighbourhoods > 0 ? " dropped (non-finite, or beyond 10^15)"
+                                           : " dropped (non-finite)");
+    if (report.emptyPixels > 0) text << ", " << report.emptyPixels << " pixels without samples";
+    if (report.farPixels > 0) text << " (" << report.farPixels << " of them more than 5 pixels from any)";
+    if (report.exactPixels > 0) text << ", " << report.exactPixels << " pixels kept: their stated error is 0";
+    text << "\n";
+    bool first = true;
+    for (int i = 0; i < kRegionOutcomes; ++i) {
+        const std::int64_t count = report.regions[static_cast<std::size_t>(i)];
+        if (count == 0) continue;
+        text << (first ? "regions: " : ", ") << count << " " << name(static_cast<RegionOutcome>(i));
+        first = false;
+    }
+    if (!first) text << "\n";
+    if (report.limitedSamples > 0 || report.neighbourhoods > 0)
+        text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
+             << " % of the light removed, " << 100 * report.energyReturned << " % given back"
+             << (report.energyRemoved - report.energyReturned > kMuchLight
+                     ? " (WARNING: much; where few samples find the light, "
+                       "--fireflies keep keeps it)\n"
+                     : "\n");
+    if (report.neighbourhoods > 0)
+        text << report.neighbourhoods << " neighbourhoods kriged, "
+             << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
+             << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
+    if (report.failedNeighbourhoods > 0)
+        text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
+    if (report.jitteredSystems > 0) text << report.jitteredSystems << " systems needed jitter\n";
+    if (report.inaccuratePixels > 0)
+        text << report.inaccuratePixels << " pixels of ill-conditioned systems may be off by rounding\n";
+    return text.str();
+}
+
+std::string toJson(const ReconstructionReport& report) { return json(report).dump(2); }
+
+std::string toJson(const Reconstruction& reconstruction) {
+    nlohmann::ordered_json document = {{"report", json(reconstruction.report)}};
+    auto& regions = document["regions"] = nlohmann::ordered_json::array();
+    for (std::size_t i = 0; i < reconstruction.regions.size(); ++i) {
+        const RegionDiagnostics& r = reconstruction.regions[i];
+        regions.push_back({{"x", r.pixels.x},
+                           {"y", r.pixels.y},
+                           {"width", r.pixels.width},
+                           {"height", r.pixels.height},
+                           {"outcome", name(r.outcome)},
+                           {"data", r.data},
+                           {"samples", r.samples},
+                           {"nugget", r.nugget},
+                           {"sill", r.sill},
+                           {"range", r.range},
+                           {"exponent", r.exponent},
+                           {"errorVariance", r.errorVariance},
+                           {"colourScale", r.colourScale},
+                           {"condition", r.condition},
+                           {"jitter", r.jitter},
+                           {"inaccurate", r.inaccurate}});
+        if (const auto found = reconstruction.inspections.find(i); found != reconstruction.inspections.end())
+            regions.back()["inspection"] = json(found->second);
+    }
+    return document.dump(1);
+}
+
+void addDiagnosticLayers(Reconstruction& reconstruction) {
+    const Image& old = reconstruction.image;
+    std::vector<std::string> channels = old.channels;
+    for (const char* layer : {"nugget", "sill", "range", "exponent", "errorVariance", "outcome"})
+        channels.push_back(std::string("diagnostics.") + layer);
+    Image image(old.data, channels);
+    image.display = old.display;
+    for (int row = 0; row < image.data.height; ++row)
+        for (int col = 0; col < image.data.width; ++col)
+            std::copy_n(old.at(col, row), old.channelCount(), image.at(col, row));
+    for (const RegionDiagnostics& r : reconstruction.regions)
+        for (int row = r.pixels.y; row < r.pixels.y + r.pixels.height; ++row)
+            for (int col = r.pixels.x; col < r.pixels.x + r.pixels.width; ++col) {
+                float* values = image.at(col - image.data.x, row - image.data.y) + old.channelCount();
+                for (const double value :
+                     {r.nugget, r.sill, r.range, r.exponent, r.errorVariance, static_cast<double>(r.outcome)})
+                    *values++ = static_cast<float>(value);
+            }
+    reconstruction.image = std::move(image);
+}
+
+}  // namespace vlx

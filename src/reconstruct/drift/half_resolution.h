@@ -1,0 +1,55 @@
+#pragma once
+
+#include "reconstruct/common/row_ring.h"
+#include "reconstruct/drift/combination.h"
+#include "reconstruct/drift/level.h"
+
+/// The picture kriged once more at half its resolution, and the two combined: drift_kriging.h, 6.
+namespace vlx {
+
+/// A picture less wide or high is kriged at its own resolution only.
+inline constexpr int kLeastHalved = 32;
+
+/// Rows of `fine` that row y of the coarse level stands for: 2 y and 2 y + 1, or the last.
+/// The data of each 2 x 2 pixels as one: means of the halves, which stay the same samples; counts k^2 / sum
+/// 1/n of k pixels with data, so that a variance over a count stays the error variance; sums of squares and
+/// degrees of freedom added; features averaged with their error variances. `width` and `height` are the fine
+/// level's. Fills row y of coarse.
+void halveRow(const PixelRows& fine, int width, int height, int radiance, int features, int y,
+              PixelRows& coarse);
+
+/// L - K, where L = K + up(C - down(K)) corrects the fine level's estimate K by the coarse one's C, and what
+/// stacking needs of it. Refers to its levels and rings. Rows may be worked on at the same time.
+class Correction {
+  public:
+    static constexpr int kReach = 3;  ///< triangular window of 7 x 7 pixels
+
+    Correction(int radiance, const LevelRows& fine, const LevelRows& coarse, RowRing& differences,
+               RowRing& corrected)
+        : planes_{radiance}, fine_(fine), coarse_(coarse), differences_(differences), corrected_(corrected) {}
+
+    static int differencePlanes(int radiance) { return radiance + 8; }
+    /// Row y of `differences`: combined rows from y - 3 to y + 3 of the fine level, and from y / 2 - 1 to
+    /// y / 2 + 1 of the coarse one, are there.
+    void differenceRow(int y);
+    /// Row y of `corrected` (CombinedPlanes): K + w (L - K), w the weight in 0 to 1 by which each half's
+    /// correction predicts the other half's data best,
+    ///     w = (sum u (L_A - K_A)(Z_B - K_A) + (A and B exchanged) + l / 2)
+    ///         / (sum u ((L_A - K_A)^2 + (L_B - K_B)^2) + l),
+    /// u one over the variance of a half's mean, l = 10: a prior of one half, since evidence in a window is
+    /// too noisy to find the gain by itself, and strong enough to refuse it. Variance, where V_C is
+    /// what C says of its own and V_K what K does: (1 - w)^2 V_K + (1 - (1 - w)^2) min(V_C, V_K)
+    /// + w (1 - w) (L - K)^2: both krige the same data, so that the better one's error is what they share.
+    /// Differences of kReach rows around y are there.
+    void correctRow(int y);
+
+  private:
+    int gain() const { return planes_.radiance + 6; }
+    int square() const { return planes_.radiance + 7; }
+
+    CombinedPlanes planes_;
+    LevelRows fine_, coarse_;
+    RowRing &differences_, &corrected_;
+};
+
+}  // namespace vlx

@@ -1,0 +1,223 @@
+#include "reconstruct/drift/level.h"
+
+#include <algorithm>
+
+#include "reconstruct/drift/prefilter.h"
+#include "reconstruct/drift/stacking.h"
+#include "variolux/base/parallel.h"
+
+namespace vlx {
+
+namespace {
+
+// Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them. With
+// tiles of 32 rows, centres that reach 15 and patches that reach 3, data are filled 160 rows ahead of the row
+// that is combined; the others are used up earlier.
+constexpr int kDataRows = 224;
+constexpr int kRawRows = 128;      // and squares
+constexpr int kFeatureRows = 160;  // and variances: finishing looks back at them
+constexpr int kSumRows = 128;
+constexpr int kEstimateRows = 64;  // and moments
+constexpr int kCombinedRows = 96;
+
+}  // namespace
+
+Level::Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models, int width, int height,
+             int ahead, const PictureScale& picture, Source source, ReconstructionReport& report,
+             StageClock& clock)
+    : layout_(layout),
+      models_(std::move(models)),
+      width_(width),
+      height_(height),
+      radiance_(layout.radiance),
+      picture_(picture),
+      source_(std::move(source)),
+      report_(report),
+      clock_(clock),
+      pixels_{RowRing(width, DataPlanes{radiance_}.channels(), kept(kDataRows + ahead)),
+              RowRing(width, kSquaresPlanes, kept(kRawRows + ahead)),
+              RowRing(width, 2 * layout.features, kept(kRawRows + ahead))},
+      features_(width, 2 * layout.features, kept(kFeatureRows)),
+      variances_(width, 3, kept(kFeatureRows)),
+      moments_(width, Combination::momentPlanes(static_cast<int>(models_.size())), kept(kEstimateRows)),
+      combined_(width, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
+      combination_(radiance_, width, height, pixels_.data, variances_, estimates_, moments_, combined_) {
+    for (std::size_t m = 0; m < models_.size(); ++m) {
+        sums_.emplace_back(width, EstimatePlanes{radiance_}.channels(), kept(kSumRows));
+        estimates_.emplace_back(width, ModelPlanes{radiance_}.channels(), kept(kEstimateRows));
+    }
+}
+
+int Level::startAbove(int first) {
+    const auto tileAbove = [](int row) { return std::max(0, row) / kTile * kTile; };
+    combinedRows_ = std::max(0, first);
+    finishedRows_ = std::max(0, first - kStackReach);
+    krigedRows_ = tileAbove(finishedRows_ - kMaxReach);
+    zeroedRows_ = std::max(0, krigedRows_ - kMaxReach);
+    varianceRows_ = std::max(0, krigedRows_ - kTileMargin);
+    featureRows_ = tileAbove(varianceRows_ - kVarianceReach);
+    return std::max(0, featureRows_ - kTileMargin);
+}
+
+std::uint64_t Level::ringBytes() const {
+    std::uint64_t bytes = 0;
+    for (const RowRing* ring :
+         {&pixels_.data, &pixels_.squares, &pixels_.raw, &features_, &variances_, &moments_, &combined_})
+        bytes += ring->bytes();
+    for (const auto* list : {&sums_, &estimates_})
+        for (const RowRing& ring : *list) bytes += ring.bytes();
+    return bytes;
+}
+
+// Each stage fills rows up to (not including) `until`, cut to the picture, after the stages that it needs.
+
+void Level::prefilter(int until) {
+    until = std::min(until, height_);
+    while (featureRows_ < until) {
+        source_(featureRows_ + kTile + kTileMargin);
+        const int y = featureRows_;
+        parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
+            prefilterFeatures(pixels_.raw, layout_, static_cast<int>(tile) * kTile, y, width_, height_,
+                              features_);
+        });
+        featureRows_ = std::min(height_, featureRows_ + kTile);
+        clock_.addTo("features");
+    }
+}
+
+void Level::smooth(int until) {
+    until = std::min(until, height_);
+    if (varianceRows_ >= until) return;
+    prefilter(until + kVarianceReach);
+    source_(until + kVarianceReach);
+    parallelFor(varianceRows_, until, [&](std::int64_t y) {
+        smoothVariances(pixels_.squares, pixels_.data, {radiance_}, features_, layout_.features, picture_,
+                        static_cast<int>(y), width_, height_, variances_);
+    });
+    varianceRows_ = until;
+    clock_.addTo("variances");
+}
+
+/// Neighbourhoods centred in rows up to `until`.
+void Level::krige(int until) {
+    until = std::min(until, height_);
+    while (krigedRows_ < until) {
+        const int y = krigedRows_;
+        smooth(y + kTile + kTileMargin);
+        TileInput input{&pixels_.data, &features_,     &variances_, {radiance_}, layout_.features,
+                        layout_.group, layout_.groups, width_,      height_};
+        // Rows that this tile row is the first to reach.
+        for (RowRing& ring : sums_)
+            for (int row = zeroedRows_; row < std::min(height_, y + kTile + kMaxReach); ++row)
+                std::fill_n(ring.row(0, row), width_ * ring.channels(), 0.f);
+        zeroedRows_ = std::min(height_, y + kTile + kMaxReach);
+        const int tiles = (width_ + kTile - 1) / kTile;
+        std::vector<NeighbourhoodCounts> counts(static_cast<std::size_t>(tiles));
+        for (int phase = 0; phase < 2; ++phase)  // tiles of one phase do not reach each other's pixels
+            parallelFor(0, (tiles + 1 - phase) / 2, [&](std::int64_t i) {
+                const int tile = 2 * static_cast<int>(i) + phase;
+                counts[static_cast<std::size_t>(tile)] = krigeTile(input, models_, tile * kTile, y, sums_);
+            });
+        for (const NeighbourhoodCounts& of : counts) {
+            report_.neighbourhoods += of.neighbourhoods;
+            report_.ownNeighbourhoods += of.own;
+            report_.failedNeighbourhoods += of.failed;
+            report_.driftFunctions += of.effective;
+            report_.driftFeatures += of.features;
+        }
+        krigedRows_ = std::min(height_, krigedRows_ + kTile);
+        clock_.addTo("kriging");
+    }
+}
+
+/// Each model's estimates, and the moments of stacking.
+void Level::finish(int until) {
+    until = std::min(until, height_);
+    if (finishedRows_ >= until) return;
+    krige(until + kMaxReach);
+    parallelFor(finishedRows_, until, [&](std::int64_t y) {
+        for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
+        if (models_.size() > 1) shrinkRow(static_cast<int>(y));
+        combination_.momentsRow(static_cast<int>(y));
+    });
+    finishedRows_ = until;
+    clock_.addTo("combining");
+}
+
+void Level::finishRow(std::size_t m, int y) {
+    const EstimatePlanes planes{radiance_};
+    const ModelPlanes out{radiance_};
+    const DataPlanes data{radiance_};
+    for (int x = 0; x < width_; ++x) {
+        double variance[3] = {};
+        double leverage = 0;
+        double perSample = 1e-300;  // of noise, over colours
+        for (int c = 0; c < 3; ++c) perSample += static_cast<double>(variances_.row(c, y)[x]) / 3;
+        for (int half = 0; half < 2; ++half) {
+            const int first = half * planes.perHalf();
+            // A half without data here takes the other's estimate.
+            int from = first;
+            if (sums_[m].row(first, y)[x] <= 0) from = planes.perHalf() - first;
+            const double weight = sums_[m].row(from, y)[x];
+            leverage += weight > 0 ? sums_[m].row(from + planes.leverage(), y)[x] / weight : 1;
+            for (int c = 0; c < radiance_; ++c) {
+                float& estimate = estimates_[m].row(out.half(half) + c, y)[x];
+                if (weight <= 0) {  // no neighbourhood with data reaches it
+                    estimate = pixels_.data.row(data.mean(half) + c, y)[x];
+                    if (c < 3) variance[c] += 2 * static_cast<double>(variances_.row(c, y)[x]);
+                    continue;
+                }
+                const double shift = sums_[m].row(from + planes.sum(c), y)[x] / weight;
+                estimate = static_cast<float>(reference(pixels_.data, data, c, x, y) + shift);
+                if (c >= 3) continue;
+                const double spread =
+                    std::max(0.0, sums_[m].row(from + planes.square(c), y)[x] / weight - shift * shift);
+                const double kriging = sums_[m].row(from + planes.variance(), y)[x] / weight;
+                const double own = kriging * static_cast<double>(variances_.row(c, y)[x]) / perSample;
+                variance[c] += spread + std::max(0.0, own - spread) / 2;
+            }
+        }
+        for (int c = 0; c < 3; ++c)
+            estimates_[m].row(out.variance() + c, y)[x] = static_cast<float>(variance[c] / 4);
+        estimates_[m].row(out.leverage(), y)[x] = static_cast<float>(leverage / 2);
+    }
+}
+
+/// The first model towards the small one, pixel by pixel, by how much of their difference the pixel's own
+/// noise explains: a pixel with unlike features all around is left with its own noisy mean.
+void Level::shrinkRow(int y) {
+    RowRing &first = estimates_.front(), &small = estimates_.back();
+    const ModelPlanes planes{radiance_};
+    for (int x = 0; x < width_; ++x) {
+        const double n = std::max(1.f, pixels_.data.row(DataPlanes{radiance_}.count(), y)[x]);
+        double apart = 0, noise = 0;
+        for (int c = 0; c < 3; ++c) {
+            const double a = first.row(c, y)[x], b = first.row(radiance_ + c, y)[x];
+            const double d = (a + b - small.row(c, y)[x] - small.row(radiance_ + c, y)[x]) / 2;
+            apart += d * d;
+            noise += static_cast<double>(variances_.row(c, y)[x]) / n;
+        }
+        float* const leverage = first.row(planes.leverage(), y) + x;
+        const double more = std::max(0.f, *leverage - small.row(planes.leverage(), y)[x]);
+        const auto kept = static_cast<float>(shrinkage(apart, more * more * noise));
+        for (int k = 0; k < 2 * radiance_; ++k) {
+            const float towards = small.row(k, y)[x];
+            first.row(k, y)[x] = towards + kept * (first.row(k, y)[x] - towards);
+        }
+        *leverage = kept * *leverage + (1 - kept) * small.row(planes.leverage(), y)[x];
+    }
+}
+
+void Level::combine(int until) {
+    until = std::min(until, height_);
+    while (combinedRows_ < until) {  // few rows at a time: the rings hold no more
+        const int end = std::min(until, combinedRows_ + kTile);
+        finish(end + kStackReach);
+        parallelFor(combinedRows_, end,
+                    [&](std::int64_t y) { combination_.combineRow(static_cast<int>(y)); });
+        combinedRows_ = end;
+        clock_.addTo("combining");
+    }
+}
+
+}  // namespace vlx

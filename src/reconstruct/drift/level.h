@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "reconstruct/common/picture_scale.h"
+#include "reconstruct/common/pixel_statistics.h"
+#include "reconstruct/common/row_ring.h"
+#include "reconstruct/common/stage_clock.h"
+#include "reconstruct/drift/combination.h"
+#include "reconstruct/drift/neighbourhoods.h"
+#include "reconstruct/drift/pixel_data.h"
+
+/// The picture at one resolution, from its data to the combination of its models: drift_kriging.h, 2 to 5.
+namespace vlx {
+
+/// What a level holds when it is combined.
+struct LevelRows {
+    int width, height;
+    const RowRing& data;       ///< DataPlanes
+    const RowRing& features;   ///< prefilter.h
+    const RowRing& variances;  ///< of one sample of R, G, B
+    const RowRing& combined;   ///< CombinedPlanes
+};
+
+/// Stages, each a ring of rows that is filled just ahead of what the next one needs.
+class Level {
+  public:
+    /// What fills pixels() up to (not including) a row, which may lie below the picture.
+    using Source = std::function<void(int until)>;
+
+    /// `ahead`: rows that the source may fill beyond what this level asks for. The last model is the small
+    /// one, which the first is shrunk towards.
+    Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models, int width, int height,
+          int ahead, const PictureScale& picture, Source source, ReconstructionReport& report,
+          StageClock& clock);
+    Level(const Level&) = delete;
+    Level& operator=(const Level&) = delete;
+
+    /// Lets each stage start just far enough above row `first` of the combination for that row to be what it
+    /// is in the whole picture. The first row of data that is needed.
+    int startAbove(int first);
+    /// Fills the combination up to `until`.
+    void combine(int until);
+
+    /// Of all rows that are kept; none is taken yet when the level is made.
+    std::uint64_t ringBytes() const;
+    PixelRows& pixels() { return pixels_; }  ///< for the source to fill
+    LevelRows rows() const { return {width_, height_, pixels_.data, features_, variances_, combined_}; }
+
+  private:
+    int kept(int rows) const { return std::min(rows, height_); }
+    void prefilter(int until);
+    void smooth(int until);
+    void krige(int until);
+    void finish(int until);
+    void finishRow(std::size_t m, int y);
+    void shrinkRow(int y);
+
+    const SampleLayout& layout_;
+    std::vector<NeighbourhoodModel> models_;
+    int width_, height_, radiance_;
+    const PictureScale& picture_;
+    Source source_;
+    ReconstructionReport& report_;
+    StageClock& clock_;
+    PixelRows pixels_;
+    RowRing features_, variances_;
+    std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: ModelPlanes
+    RowRing moments_, combined_;
+    Combination combination_;
+    int featureRows_ = 0, varianceRows_ = 0, krigedRows_ = 0, zeroedRows_ = 0, finishedRows_ = 0,
+        combinedRows_ = 0;
+};
+
+}  // namespace vlx

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "reconstruct/common/pixel_statistics.h"
+#include "reconstruct/common/row_ring.h"
+#include "reconstruct/drift/gap_field.h"
+
+/// From gathered statistics to the data that are kriged: means of the halves without fireflies, holes filled.
+namespace vlx {
+
+/// Pixels within which a pixel without samples, or without those of a half, looks for some.
+inline constexpr int kHoleReach = 5;
+
+/// Planes of the data.
+struct DataPlanes {
+    int radiance = 3;
+    int meanA() const { return 0; }  ///< radiance channels
+    int meanB() const { return radiance; }
+    int countA() const { return 2 * radiance; }  ///< samples: 0 where the mean is no datum
+    int countB() const { return 2 * radiance + 1; }
+    int count() const { return 2 * radiance + 2; }
+    int stated() const { return 2 * radiance + 3; }  ///< 1 where the dump states the error variance
+    int gap() const { return 2 * radiance + 4; }  ///< pixels to the nearest samples: 0 where there are some
+    int removed() const { return 2 * radiance + 5; }  ///< R, G, B taken off the mean as a firefly's
+    int channels() const { return 2 * radiance + 8; }
+
+    int mean(int half) const { return half == 0 ? meanA() : meanB(); }
+    int halfCount(int half) const { return half == 0 ? countA() : countB(); }
+};
+
+/// Mean of all samples of a pixel; 0 where it has none.
+inline double plainMean(const RowRing& data, const DataPlanes& planes, int channel, int x, int y) {
+    const double nA = data.row(planes.countA(), y)[x], nB = data.row(planes.countB(), y)[x];
+    if (nA + nB <= 0) return 0;
+    return (nA * static_cast<double>(data.row(planes.meanA() + channel, y)[x]) +
+            nB * static_cast<double>(data.row(planes.meanB() + channel, y)[x])) /
+           (nA + nB);
+}
+
+/// Degrees of freedom of a pixel of one sample, whose variance is what its neighbours differ from it by.
+inline constexpr float kBorrowedFreedom = 1e-3f;
+
+/// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples.
+inline constexpr int kSquaresPlanes = 5;
+
+/// What kriging starts from, a ring of rows each.
+struct PixelRows {
+    RowRing data;     ///< DataPlanes
+    RowRing squares;  ///< kSquaresPlanes
+    RowRing raw;      ///< f features, then the error variances of their means
+};
+
+/// What was taken off the fireflies of a row, and what was filled in.
+struct LimitedRow {
+    std::int64_t samples = 0;
+    double luminance = 0;
+    std::int64_t farPixels = 0;  ///< without samples within kHoleReach
+};
+
+/// Refers to its rings. Rows may be filled at the same time.
+class PixelData {
+  public:
+    /// `scale`: pixels of the image along each axis for one of the dump; `robust`: Fireflies::Robust.
+    PixelData(const SampleSource& dump, const SampleLayout& layout, const GatheredPlanes& planes, int scale,
+              int width, int height, bool robust, RowRing& gathered, PixelRows& out)
+        : dump_(dump),
+          layout_(layout),
+          planes_(planes),
+          dataPlanes_{layout.radiance},
+          scale_(scale),
+          width_(width),
+          height_(height),
+          radiance_(layout.radiance),
+          robust_(robust),
+          gathered_(gathered),
+          out_(out) {}
+
+    /// Rows that must be gathered above and below the ones that are filled.
+    static int reach(int scale);
+
+    /// To be called before the rows [first, until) are filled: reads the dump once more if one of their
+    /// pixels has no samples within kHoleReach.
+    void prepare(int first, int until);
+    /// Fills row y; rows reach() around it are gathered.
+    LimitedRow fillRow(int y);
+
+  private:
+    struct Place {
+        int x, y;  // x -1: none
+        float distance;
+    };
+    Place nearest(int count, int x, int y) const;
+    float fillHole(int x, int y, LimitedRow& row);
+    void limitPixel(int x, int y, LimitedRow& row);
+    float halfMean(int half, int c, int x, int y) const;
+    float secondBrightest(int x, int y) const;
+    void borrowSquares(int x, int y, float* squares, float& freedom) const;
+
+    const SampleSource& dump_;
+    const SampleLayout& layout_;
+    const GatheredPlanes& planes_;
+    DataPlanes dataPlanes_;
+    int scale_, width_, height_, radiance_;
+    bool robust_;
+    RowRing& gathered_;
+    PixelRows& out_;
+    std::unique_ptr<GapField> far_;
+};
+
+}  // namespace vlx

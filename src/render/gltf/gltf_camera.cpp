@@ -1,0 +1,80 @@
+#include "render/gltf/gltf_camera.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <sstream>
+
+namespace vlx::render {
+namespace {
+
+/// Of a picture's sides: no aspect is beyond it.
+constexpr double kMostSide = 1 << 20;
+
+/// Rotation and translation of a transform: cameras do not scale.
+std::optional<Transform> rigid(const Transform& t) {
+    Transform r = t;
+    for (std::size_t j = 0; j < 3; ++j) {
+        const double norm = std::sqrt(t.m[0][j] * t.m[0][j] + t.m[1][j] * t.m[1][j] + t.m[2][j] * t.m[2][j]);
+        if (!(norm > 0) || !std::isfinite(norm)) return std::nullopt;
+        for (std::size_t i = 0; i < 3; ++i) r.m[i][j] = t.m[i][j] / norm;
+    }
+    return r;
+}
+
+std::string is(const char* what, double value, const char* expected) {
+    std::ostringstream text;
+    text << "its " << what << " is " << value << ", expected " << expected;
+    return text.str();
+}
+
+/// Why a perspective cannot be rendered with, or nothing.
+std::string faultOf(const tinygltf::PerspectiveCamera& p, bool zeroAspect) {
+    const auto fov = static_cast<float>(p.yfov);
+    if (!(fov > std::numeric_limits<float>::epsilon() && fov < kPi))
+        return is("yfov", p.yfov, "between 0 and pi");
+    const bool given = p.aspectRatio != 0 || zeroAspect;
+    if (given && !(p.aspectRatio >= 1 / kMostSide && p.aspectRatio <= kMostSide))
+        return is("aspectRatio", p.aspectRatio, "2^-20 to 2^20");
+    return {};
+}
+
+}  // namespace
+
+Camera readCamera(const GltfFile& file, const tinygltf::Node& node, const Transform& toWorld,
+                  const Motion& motion) {
+    const auto index = static_cast<std::size_t>(node.camera);
+    const tinygltf::Camera& source = file.model().cameras[index];
+    Camera camera;
+    camera.name = node.name.empty() ? source.name : node.name;
+    if (source.type != "perspective") {
+        camera.unusable = "it is not a perspective camera";
+    } else {
+        camera.unusable = faultOf(source.perspective, file.zeroAspect(index));
+        camera.verticalFov = static_cast<float>(source.perspective.yfov);
+        camera.aspect = static_cast<float>(source.perspective.aspectRatio);
+    }
+    const auto place = rigid(toWorld);
+    if (!place)
+        camera.unusable = "its transform has no inverse";
+    else if (!isFinite(place->point({0, 0, 0})))
+        camera.unusable = "it is further away than 32-bit floats reach";
+    camera.toWorld = place.value_or(Transform{});
+    camera.motion.cause = motion.cause;
+    for (const Transform& at : motion.places) {
+        const auto rigidPlace = rigid(at);
+        if (!rigidPlace) camera.unusable = "its transform has no inverse while the shutter is open";
+        camera.motion.places.push_back(rigidPlace.value_or(at));
+    }
+    const auto extra = [&](const char* key) {
+        return number(node.extras, key, number(source.extras, key, 0));
+    };
+    camera.lensRadius = static_cast<float>(extra("lens_radius"));
+    camera.focusDistance = static_cast<float>(extra("focus_distance"));
+    if (camera.lensRadius > 0 && !(camera.focusDistance > 0))
+        camera.unusable = "it has a lens_radius but no positive focus_distance";
+    camera.preferred = extra("active") != 0;
+    return camera;
+}
+
+}  // namespace vlx::render

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/gltf/gltf_file.h"
+#include "render/scene/material.h"
+
+namespace vlx::render {
+
+/// Reads materials and, once each, the textures they use.
+class MaterialReader {
+  public:
+    /// Appends textures to `textures`.
+    MaterialReader(const GltfFile& file, std::vector<Texture>& textures) : file_(file), textures_(textures) {}
+
+    Material read(const tinygltf::Material& source, std::size_t index);
+
+  private:
+    TextureRef texture(int index, int uvSet, const tinygltf::ExtensionMap& extensions, ColourSpace space,
+                       const std::string& what);
+    TextureRef texture(const tinygltf::Value& object, const std::string& key, ColourSpace space,
+                       const std::string& what);
+
+    const GltfFile& file_;
+    std::vector<Texture>& textures_;
+    std::map<std::pair<int, ColourSpace>, int> loaded_;
+};
+
+}  // namespace vlx::render

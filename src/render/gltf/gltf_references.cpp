@@ -1,0 +1,142 @@
+#include "render/gltf/gltf_references.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+namespace vlx::render {
+namespace {
+
+bool isHex(char c) { return std::isxdigit(static_cast<unsigned char>(c)) != 0; }
+
+/// URIs write some characters as %20.
+std::string decoded(const std::string& uri) {
+    std::string text;
+    for (std::size_t i = 0; i < uri.size(); ++i) {
+        const bool hex = uri[i] == '%' && i + 2 < uri.size() && isHex(uri[i + 1]) && isHex(uri[i + 2]);
+        text += hex ? static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16)) : uri[i];
+        if (hex) i += 2;
+    }
+    return text;
+}
+
+using Json = nlohmann::ordered_json;
+
+void keepOnly(Json& object, std::initializer_list<const char*> keys) {
+    for (auto item = object.begin(); item != object.end();)
+        item = std::ranges::find(keys, item.key()) == keys.end() ? object.erase(item) : std::next(item);
+}
+
+/// An array of an object, or an empty one.
+const Json& listOf(const Json& object, const char* key) {
+    static const Json none = Json::array();
+    if (!object.is_object()) return none;
+    const auto found = object.find(key);
+    return found != object.end() && found->is_array() ? *found : none;
+}
+
+std::optional<std::size_t> indexOf(const Json& object, const char* key) {
+    if (!object.is_object() || !object.contains(key) || !object[key].is_number_unsigned()) return {};
+    return object[key].get<std::size_t>();
+}
+
+/// The nodes that have cameras, and all above them.
+std::set<std::size_t> cameraNodes(const Json& nodes) {
+    std::map<std::size_t, std::size_t> parents;
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+        for (const Json& child : listOf(nodes[i], "children"))
+            if (child.is_number_unsigned()) parents[child.get<std::size_t>()] = i;
+    std::set<std::size_t> found;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        if (!nodes[i].is_object() || !nodes[i].contains("camera")) continue;
+        std::size_t at = i;
+        while (found.insert(at).second && parents.contains(at)) at = parents[at];
+    }
+    return found;
+}
+
+/// Leaves the channels that move one of the nodes, and the animations that have any.
+Json animationsOf(const Json& animations, const std::set<std::size_t>& nodes) {
+    Json kept = Json::array();
+    for (Json animation : animations) {
+        Json channels = Json::array();
+        for (const Json& channel : listOf(animation, "channels"))
+            if (channel.is_object() && channel.contains("target"))
+                if (const auto node = indexOf(channel["target"], "node"); node && nodes.contains(*node))
+                    channels.push_back(channel);
+        if (channels.empty()) continue;
+        animation["channels"] = std::move(channels);
+        kept.push_back(std::move(animation));
+    }
+    return kept;
+}
+
+}  // namespace
+
+std::string gltfJson(const std::string& path) {
+    std::error_code ignored;
+    std::ifstream in;
+    if (std::filesystem::is_regular_file(path, ignored)) in.open(path, std::ios::binary | std::ios::ate);
+    if (!in.is_open()) return {};
+    std::uint64_t size = static_cast<std::uint64_t>(in.tellg());
+    in.seekg(0);
+    char head[20] = {};
+    in.read(head, sizeof head);
+    if (in && std::memcmp(head, "glTF", 4) == 0) {
+        std::uint32_t length = 0;
+        std::memcpy(&length, head + 12, sizeof length);
+        size = std::min(std::uint64_t{length}, size - sizeof head);
+    } else {
+        in.clear();
+        in.seekg(0);
+    }
+    std::string text(size, '\0');
+    in.read(text.data(), static_cast<std::streamsize>(size));
+    return text;
+}
+
+std::string camerasAlone(const std::string& json) {
+    Json file = Json::parse(json, nullptr, false);
+    if (!file.is_object()) return {};
+    const Json animations = animationsOf(listOf(file, "animations"), cameraNodes(listOf(file, "nodes")));
+    if (animations.empty()) {
+        keepOnly(file, {"asset", "scene", "scenes", "nodes", "cameras"});
+    } else {
+        keepOnly(file,
+                 {"asset", "scene", "scenes", "nodes", "cameras", "accessors", "bufferViews", "buffers"});
+        file["animations"] = animations;
+    }
+    if (file.contains("nodes") && file["nodes"].is_array())
+        for (Json& node : file["nodes"])
+            if (node.is_object())
+                keepOnly(node, {"name", "camera", "children", "matrix", "translation", "rotation", "scale",
+                                "extras"});
+    return file.dump();
+}
+
+std::vector<std::string> gltfFiles(const std::string& path) {
+    std::vector<std::string> files = {path};
+    const auto json = nlohmann::json::parse(gltfJson(path), nullptr, false);
+    if (!json.is_object()) return files;
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    for (const char* kind : {"buffers", "images"}) {
+        const auto list = json.find(kind);
+        if (list == json.end() || !list->is_array()) continue;
+        for (const auto& item : *list) {
+            const auto uri = item.is_object() ? item.find("uri") : item.end();
+            if (!item.is_object() || uri == item.end() || !uri->is_string()) continue;
+            const auto text = uri->get<std::string>();
+            if (!text.starts_with("data:")) files.push_back((folder / decoded(text)).string());
+        }
+    }
+    return files;
+}
+
+}  // namespace vlx::render

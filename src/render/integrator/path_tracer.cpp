@@ -1,0 +1,56 @@
+#include "render/integrator/path_tracer.h"
+
+#include "render/integrator/path_kernel.h"
+
+namespace vlx::render {
+namespace {
+
+/// What effects take of a kernel.
+Features featuresFor(const EffectSet& effects, const EffectSet& leftOut, const Scene& scene) {
+    using enum Effect;
+    Features f;
+    f.layers = effects.hasAny({Clearcoat, Sheen});
+    f.glass = effects.hasAny({Transmission, RoughTransmission});
+    f.reflection = f.layers || f.glass || effects.hasAny({Glossy, Mirror});
+    f.textures = effects.hasAny({Textures, NormalMaps}) || !scene.colours.empty();
+    f.rare = effects.hasAny({Absorption, ObjectMotion}) || !leftOut.none();
+    return f;
+}
+
+bool covers(const Features& kernel, const Features& wanted) {
+    const auto implies = [](bool a, bool b) { return !a || b; };
+    return implies(wanted.reflection, kernel.reflection) && implies(wanted.layers, kernel.layers) &&
+           implies(wanted.glass, kernel.glass) && implies(wanted.textures, kernel.textures) &&
+           implies(wanted.rare, kernel.rare);
+}
+
+}  // namespace
+
+PathTracer::PathTracer(const Scene& scene, const Accelerator& accelerator, const PathOptions& options)
+    : scene_(scene),
+      accelerator_(accelerator),
+      options_(options),
+      lights_(scene, options.effects == EffectSet::all()),
+      features_(kEveryFeature),
+      kernel_(&PathTracer::traceWith<kEveryFeature>),
+      hashesOpacity_(options.effects.has(Effect::Alpha)),
+      choosesLights_(lights_.size() > 1 || options.effects == EffectSet::all()),
+      absorbs_(options.effects.has(Effect::Absorption)),
+      dropsCaustics_(options.leftOut.has(Effect::Caustics)) {
+    if (!options.effects.has(Effect::Indirect)) options_.maxBounces = std::min(1, options.maxBounces);
+    const Features wanted = featuresFor(options.effects, options.leftOut, scene);
+    // Smallest first. One with everything but the rare parts serves what none of the smaller ones does.
+    const auto offer = [&]<Features F>() {
+        if (features_ != kEveryFeature || !covers(F, wanted)) return;
+        features_ = F;
+        kernel_ = &PathTracer::traceWith<F>;
+    };
+    offer.operator()<kMatte>();
+    offer.operator()<kMatteTextured>();
+    offer.operator()<kReflecting>();
+    offer.operator()<kReflectingTextured>();
+    offer.operator()<kLayered>();
+    offer.operator()<kLayeredTextured>();
+}
+
+}  // namespace vlx::render

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "render/film/render.h"
+#include "render/plan/plan.h"
+
+namespace vlx::render {
+
+/// Part of the tracing time that each effect takes: 1 less the time without it over the time with it, from a
+/// few thousand samples each, processor time. Measured, so it differs a little from run to run. Nothing for
+/// effects that are not called for, and for all of them when the scene has more than two million vertices.
+/// `scene`: the plan applied; `options`: of the picture.
+std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, const Plan& plan,
+                                                        const RenderOptions& options);
+
+/// What a few samples, spread over the picture, say of all.
+struct PilotMeasure {
+    double seconds = 0;           ///< of the pilot itself, wall time
+    double secondsPerSample = 0;  ///< wall time, on all threads; writing not included
+    double relativeVariance = 0;  ///< mean over pixels and channels of a sample's variance / (mean^2 + 0.01)
+};
+
+/// Traces pixels of a grid over the picture, 16 samples each, until that has taken `atLeast` seconds. With
+/// bidirectional tracing the variance is not that of the picture, which has splats too.
+PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, const RenderOptions& options,
+                          double atLeast);
+
+}  // namespace vlx::render

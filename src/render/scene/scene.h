@@ -1,0 +1,148 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "render/light/light.h"
+#include "render/math/transform.h"
+#include "render/math/vec.h"
+#include "render/scene/camera.h"
+#include "render/scene/material.h"
+#include "render/scene/motion.h"
+#include "render/scene/texture.h"
+#include "render/surface/bsdf.h"
+#include "render/surface/energy_tables.h"
+
+namespace vlx::render {
+
+/// One half cache line; Embree reads the positions in place.
+struct Vertex {
+    Vec3 position;
+    Vec3 normal;  ///< unit length
+    Vec2 uv;
+};
+static_assert(sizeof(Vertex) == 32);
+
+/// Unit tangent, and the sign of the bitangent.
+struct Tangent {
+    Vec3 direction;
+    float sign = 1;
+};
+
+/// One primitive of a glTF mesh: triangles with one material. In world space, unless it belongs to a group.
+struct Shape {
+    std::uint32_t firstTriangle = 0;
+    std::uint32_t triangles = 0;
+    std::uint32_t firstVertex = 0;
+    std::uint32_t vertices = 0;
+    std::uint32_t material = 0;
+    std::int32_t light = -1;         ///< index of its mesh light, or -1
+    std::int64_t firstTangent = -1;  ///< of the optional arrays: -1 when it has none
+    std::int64_t firstSecondUv = -1;
+    std::int64_t firstColour = -1;
+};
+
+/// Shapes of a mesh that more than one node uses: in the mesh's own space.
+struct Group {
+    std::uint32_t firstShape = 0;
+    std::uint32_t shapes = 0;
+};
+
+struct Instance {
+    std::uint32_t group = 0;
+    Transform toWorld;         ///< in the middle of the exposure, when it moves
+    std::int32_t motion = -1;  ///< index into the scene's motions, or -1
+};
+
+/// What was met while loading that a person may want to know.
+struct LoadReport {
+    std::uint64_t degenerateTriangles = 0;  ///< zero area: dropped
+    std::vector<std::string> warnings;
+};
+
+/// A scene as the tracer wants it. Meshes that one node uses are stored flat in world space; meshes that
+/// several nodes use, or that move, are stored once and instanced, except emissive ones that stand still,
+/// which become lights and are flattened.
+struct Scene {
+    std::string name;
+    std::vector<Vertex> vertices;
+    std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into vertices; front counter-clockwise
+    std::vector<Tangent> tangents;
+    std::vector<Vec2> secondUvs;
+    std::vector<Rgba> colours;      ///< linear factors of the base colour
+    std::vector<Shape> shapes;      ///< groups' shapes come last
+    std::uint32_t worldShapes = 0;  ///< number of shapes that are in no group
+    std::vector<Group> groups;
+    std::vector<Instance> instances;
+    std::vector<Motion> motions;
+
+    std::vector<Material> materials;
+    std::vector<Texture> textures;
+    std::vector<AlbedoTable> albedoTables;  ///< one for each index of refraction; the first is of 1.5
+    std::vector<GlassTable> glassTables;
+    std::vector<SheenTable> sheenTables;  ///< one when anything has sheen
+
+    std::vector<Camera> cameras;
+    std::size_t activeCamera = 0;  ///< the one to use by default: wantedCamera or the first usable one
+    std::size_t wantedCamera = 0;  ///< which the file means: marked `active`, or the first
+    std::vector<Light> lights;
+    Environment environment;
+    Shutter shutter;             ///< during which motions were followed
+    std::size_t animations = 0;  ///< in the file, whether they move anything or not
+
+    Vec3 boundsMin{0, 0, 0};
+    Vec3 boundsMax{0, 0, 0};
+    LoadReport report;
+
+    std::uint64_t triangleCount() const;  ///< instances counted
+};
+
+/// Corners of a triangle's texture coordinates, and what follows from them.
+struct TextureCoordinates {
+    Vec2 first;
+    Vec2 second;
+
+    Vec2 of(const TextureRef& ref) const { return ref.map(ref.uvSet == 0 ? first : second); }
+};
+
+/// Coordinates at barycentric (u, v) of the second and third corner.
+TextureCoordinates textureCoordinates(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u,
+                                      float v);
+
+/// Opacity in [0, 1] at a point of a triangle: textures and vertex colours applied; 0 or 1 for Mask, 1 for
+/// Opaque.
+float opacityAt(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v);
+
+/// Radiance emitted at a point of a triangle in a direction at `cosTheta` to its normal: textures and the
+/// clearcoat's reflection applied, opacity not.
+Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v,
+                    float cosTheta);
+
+/// What a ray found, as the material wants it.
+struct SurfacePoint {
+    Vec3 position;
+    Vec3 geometricNormal;  ///< unit, on the viewer's side
+    Vec3 shadingNormal;    ///< unit, on the viewer's side, interpolated and normal-mapped
+    Vec3 frontNormal;      ///< the same on the front, not yet turned towards the viewer
+    bool fromBehind = false;
+    const Shape* shape = nullptr;
+    const Material* material = nullptr;
+    std::uint32_t triangle = 0;  ///< of the scene
+    TextureCoordinates uv;
+    Rgb colour{1, 1, 1};  ///< vertex colour
+};
+
+/// The same point seen by another viewer, `toViewer` being the unit direction to him.
+SurfacePoint seenFrom(SurfacePoint point, const Vec3& toViewer);
+
+struct Hit;  // accelerator.h
+
+/// `time`: of the ray.
+SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirection, float time = 0);
+
+/// The material there, textures applied.
+SurfaceParameters surfaceParameters(const Scene& scene, const SurfacePoint& point);
+
+}  // namespace vlx::render

@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+"""Which room may include which: the directions of DESIGN's house, kept.  usage: includes.py PROJECT
+
+Rooms are the folders of src and include/variolux; a header of include/variolux/X belongs to room X."""
+import os
+import re
+import sys
+
+MAY = {  # room: rooms whose headers it may include, besides its own
+    'base': set(),
+    'geostat': {'base'},
+    'exr': {'base'},
+    'dump': {'base', 'exr'},
+    'import': {'base', 'exr', 'dump'},
+    'edit': {'base', 'exr', 'dump'},
+    'reconstruct': {'base', 'dump', 'geostat'},
+    'compare': {'base'},
+    'render': {'base', 'dump'},
+}
+APART = [('reconstruct/paper', 'reconstruct/drift')]  # neither includes the other
+
+include = re.compile(r'^\s*#include "([^"]+)"', re.M)
+
+
+def room_of(path):
+    """Of a header as it is included, or of a file relative to src or include."""
+    parts = path.split('/')
+    return parts[1] if parts[0] == 'variolux' else parts[0]
+
+
+def faults(project):
+    for root in ('src', 'include'):
+        for folder, _, names in os.walk(os.path.join(project, root)):
+            sources = [name for name in names if name.endswith(('.h', '.cpp'))]
+            for name in sources:
+                path = os.path.join(folder, name)
+                relative = os.path.relpath(path, os.path.join(project, root))
+                room = room_of(relative)
+                if room not in MAY:
+                    yield f'{path}: expected a room of {sorted(MAY)}, found {room}'
+                    continue
+                with open(path, encoding='utf-8') as file:
+                    text = file.read()
+                for header in include.findall(text):
+                    if '/' not in header and os.path.exists(os.path.join(folder, header)):
+                        continue
+                    other = room_of(header)
+                    if other != room and other not in MAY[room]:
+                        yield f'{path}: {room} includes {header}; it may include {sorted(MAY[room])}'
+                    for one, two in APART:
+                        for here, there in ((one, two), (two, one)):
+                            if relative.startswith(here + '/') and header.startswith(there + '/'):
+                                yield f'{path}: {here} includes {header}; they are apart'
+
+
+if __name__ == '__main__':
+    found = list(faults(sys.argv[1]))
+    print('\n'.join(found) if found else 'all directions kept')
+    sys.exit(1 if found else 0)
