@@ -4,7 +4,7 @@
 //   float         the same with a float factor and refinement
 //   batched       krigeBatch, a thousand systems at a time
 //   pivoted LU    the bordered matrix of the textbook, by Eigen's full-pivot LU
-// and what more digits cost where double precision has lost too many. Prints tables for the README. All
+// and what more digits cost where double precision has lost too many. Prints tables for testdata/results. All
 // columns are measured in turns in one run; times are the fastest of many.
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

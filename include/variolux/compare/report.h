@@ -60,7 +60,7 @@ std::string describe(const Violation& violation);
 std::string toText(const Report& report);
 
 /// The same for machines: JSON with finite numbers only, null where a number is not finite or not defined
-/// (psnr of equal images, ssim of tiny ones). See the README.
+/// (psnr of equal images, ssim of tiny ones).
 std::string toJson(const Report& report);
 
 }  // namespace vlx

@@ -21,7 +21,7 @@ struct DumpChannel {
     ChannelType type = ChannelType::Float;
 };
 
-/// What a dump's header says: everything but the samples. The format is specified in the README.
+/// What a dump's header says: everything but the samples. FORMAT.md beside it specifies the format.
 struct DumpHeader {
     Window data;     ///< pixels held
     Window display;  ///< the whole picture; equal to data unless the dump is a crop

@@ -19,7 +19,7 @@ namespace vlx {
 ///         [&](std::int64_t done, std::int64_t total) { if (restarted) throw Cancelled(); show(done, total);
 ///         });
 ///
-/// What a Progress throws ends the reconstruction and comes out of it. README, "Sample dumps", says which
+/// What a Progress throws ends the reconstruction and comes out of it. FORMAT.md says which
 /// channels there are and what they mean. Values are rounded to their channels' types, so that the result has
 /// the bits that it would have by way of a dump with this header.
 class SampleBuffer : public SampleSource {

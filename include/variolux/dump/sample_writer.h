@@ -49,7 +49,7 @@ class SampleTile {
 ///     // when all are done:
 ///     writer.close();
 ///
-/// README, "Sample dumps", says which channels there are and what they mean. Tiles go to a nameless file
+/// FORMAT.md says which channels there are and what they mean. Tiles go to a nameless file
 /// beside the dump (as many bytes as the samples have) and become the dump in close(): memory is that of the
 /// tiles being filled and a few rows. A pixel's samples are in the order of passes, then as they were added;
 /// the dump's bytes do not depend on threads as long as tiles of one pass do not overlap. Pixels of no tile

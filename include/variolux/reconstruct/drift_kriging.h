@@ -37,7 +37,7 @@
 ///    the pixel's datum weighs in its estimate (the diagonal of the hat matrix), averaged over
 ///    neighbourhoods. Models and the pixel's plain mean are combined per pixel by stacking (Breiman 1996):
 ///    convex weights that predict half B from half A and the reverse, fitted over about 20 x 20 pixels; the
-///    plain mean enters only where it improves by two standard errors.
+///    plain mean enters only where it improves by one standard error.
 /// 6. *Half the resolution*: the same data, 2 x 2 pixels as one, are kriged by the same models, C. The
 ///    estimate K becomes K + w (L - K), L = K + up(C - down(K)), with the w in 0 to 1 by which each half's
 ///    correction predicts the other half's data best in 7 x 7 pixels (half_resolution.h). Noise of low

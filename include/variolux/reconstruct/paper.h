@@ -71,7 +71,7 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, 
 
 /// The method over a whole dump, region by region. No pixel is sure of itself: where not two of a region's N
 /// samples differ, one sample's variance is taken to be that of what they may not have seen, 3 / N times the
-/// square of the pixel's level or the picture's mean (drift_kriging.h, 7); it changes the errors, not the
+/// square of the pixel's level or the picture's mean (drift_kriging.h, 9); it changes the errors, not the
 /// estimates. A region without samples is 0, with the picture's spread about 0 as its error. Deterministic
 /// for any number of threads. Throws as SampleSource::read; Error when options are invalid or a region holds
 /// more than kMaxRegionData cells.

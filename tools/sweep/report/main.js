@@ -1,7 +1,7 @@
 // Puts the page together.
 
 const data = JSON.parse($('data').textContent);
-// The headline chart alone, for tools/report-figure.
+// The headline chart alone, for a picture of it.
 if (location.hash === '#figure') document.body.classList.add('figure');
 
 const page = { measure: data.measures[0].name, hidden: new Set() };
