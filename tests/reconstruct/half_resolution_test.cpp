@@ -198,10 +198,10 @@ TEST_F(FinishingTest, LightThatManyPixelsLostComesBack) {
     for (int c = 0; c < 3; ++c) level_.set(level_.data, data_.removed() + c, 0.1f);
     finish();
     for (const auto& [x, y] : {std::pair{20, 20}, {0, 0}, {39, 5}}) {
-        EXPECT_NEAR(value(1, x, y), 1.1, 0.001) << x;
-        EXPECT_NEAR(value(3, x, y), 0.55, 0.0005) << x;  // a part of R by R's share
+        EXPECT_NEAR(value(1, x, y), 1.1, 0.004) << x;   // 4 in 100 effective pixels at the corner
+        EXPECT_NEAR(value(3, x, y), 0.55, 0.002) << x;  // a part of R by R's share
     }
-    EXPECT_NEAR(returned_, 0.1 * 8 * kSide * kSide, 0.01 * 8 * kSide * kSide);
+    EXPECT_NEAR(returned_, 0.1 * 8 * kSide * kSide, 0.002 * 8 * kSide * kSide);
 }
 
 TEST_F(FinishingTest, LightThatOnePixelLostIsNoKnowledge) {

@@ -46,13 +46,14 @@
 /// 7. *Outliers and light*: a pixel beyond the range of its eight neighbours moves towards them by how much
 /// of
 ///    the excess its own noise explains. What fireflies lost in the 33 x 33 pixels around is given back in
-///    proportion to the light there, by how much of it is no accident of a few samples (finishing.h).
+///    proportion to the light there, by how much of it is beyond two standard errors (finishing.h).
 /// 8. *Error map*: the estimator's own variance. The noise of the halves' common data is estimated twice, and
 ///    half of each taken: by what the halves' combinations differ in, (A - B)^2 / 4 over 5 x 5 pixels of
 ///    alike features; and by the kriging variance of the neighbourhoods, v (1 + p) / sum w (p effective
 ///    functions), less what they spread about their mean, which averaging takes off. That spread is added, as
 ///    what the drift does not say, and so is what a model differs from the combination by beyond its own
 ///    variance; half the resolution mixes its own in by w, where that is less, and adds w (1 - w) (L - K)^2.
+///    Lost light is known to as many samples as lost it: y^2 times sum r^2 / (sum y)^2.
 /// 9. *What samples do not say*: no pixel is exact but where the dump states an error variance of 0, there
 ///    and at all pixels that it was pooled over. Where not two of the n samples around a pixel differ, what
 ///    they did not see has a probability of up to 3 / n (95 % confidence): the variance of a sample is 3 / n

@@ -8,6 +8,9 @@
 /// What a picture is like as a whole: for pixels of which, and around which, samples say nothing.
 namespace vlx {
 
+/// Of radiance: half floats cannot tell values apart that differ by less, relative to their level.
+inline constexpr double kAgreement = 1.0 / 1024;
+
 /// Measured in 16 rows spread evenly over the dump, whatever band of it is reconstructed; in all rows where
 /// these hold no light.
 struct PictureScale {

@@ -12,6 +12,7 @@ namespace vlx {
 
 namespace {
 
+constexpr double kKnown = 4;             // (standard errors of lost light that are none)^2
 constexpr float kFeatureWidth2 = 0.01f;  // (a tenth of a feature's scale)^2
 
 /// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
@@ -26,6 +27,14 @@ int colourOf(const std::string& channel) {
     const std::string last = channel.substr(channel.rfind('.') + 1);
     const std::size_t at = std::string("RGB").find(last);
     return last.size() == 1 && at != std::string::npos ? static_cast<int>(at) : -1;
+}
+
+/// Of a pixel `d` columns or rows away: smooth to the window's border, which would show where much light
+/// comes back.
+double lightWeight(int d) {
+    constexpr double kSide = Finishing::kLightReach + 1;
+    const double u = 1 - d * d / (kSide * kSide);
+    return u * u;
 }
 
 /// Calls f(col, row) for the up to eight neighbours of a pixel.
@@ -120,7 +129,6 @@ void Finishing::cleanRow(int y) {
 }
 
 void Finishing::lightRow(int y) {
-    const auto side = [](int d) { return (kLightReach + 1.0 - std::abs(d)) / (kLightReach + 1.0); };
     const auto w = static_cast<std::size_t>(width_);
     std::vector<double> in(kLightPlanes * w);
     for (std::size_t i = 0; i < w; ++i)
@@ -135,7 +143,7 @@ void Finishing::lightRow(int y) {
             double sum = 0;
             for (int col = std::max(0, x - kLightReach); col <= std::min(width_ - 1, x + kLightReach);
                  ++col) {
-                const double weight = side(col - x);
+                const double weight = lightWeight(col - x);
                 sum += (k == 3 ? weight * weight : weight) *
                        in[static_cast<std::size_t>(k) * w + static_cast<std::size_t>(col)];
             }
@@ -145,13 +153,13 @@ void Finishing::lightRow(int y) {
 
 /// By what share R, G, B and all of them grow, pixel by pixel of row y, so that what fireflies lost around is
 /// given back in proportion to the light there, by how much of it is no accident of a few samples:
-/// (1 - sum r^2 / (sum r)^2)+. Last, the variance of what was lost, sum r^2, as a share of the light's
-/// square.
+/// (1 - 4 sum r^2 / (sum r)^2)+, nothing within two standard errors. Last, the variance of what was lost, sum
+/// r^2, as a share of the light's square.
 std::vector<double> Finishing::returned(int y) const {
     const auto w = static_cast<std::size_t>(width_);
     std::vector<double> sums(kLightPlanes * w), shares(5 * w);
     for (int row = std::max(0, y - kLightReach); row <= std::min(height_ - 1, y + kLightReach); ++row) {
-        const double weight = (kLightReach + 1.0 - std::abs(row - y)) / (kLightReach + 1.0);
+        const double weight = lightWeight(row - y);
         for (int k = 0; k < kLightPlanes; ++k) {
             const float* in = light_.row(k, row);
             double* sum = sums.data() + static_cast<std::size_t>(k) * w;
@@ -165,7 +173,7 @@ std::vector<double> Finishing::returned(int y) const {
             lost += sums[c * w + i];
             light += sums[(4 + c) * w + i];
         }
-        const double known = shrinkage(square, sums[3 * w + i]);
+        const double known = shrinkage(square, kKnown * sums[3 * w + i]);
         for (std::size_t c = 0; c < 3; ++c)
             if (sums[(4 + c) * w + i] > 0)
                 shares[c * w + i] = known * sums[c * w + i] / sums[(4 + c) * w + i];

@@ -13,8 +13,9 @@ namespace vlx {
 /// Refers to its level and rings. Rows may be worked on at the same time.
 class Finishing {
   public:
-    static constexpr int kLightReach = 16;  ///< pixels: triangular window of 33 x 33 pixels
-    static constexpr int kAlikeReach = 2;   ///< of the error map: 5 x 5 pixels
+    static constexpr int kLightReach =
+        16;  ///< pixels: a window of 33 x 33 pixels, (1 - u^2)^2 along each axis
+    static constexpr int kAlikeReach = 2;  ///< of the error map: 5 x 5 pixels
 
     /// `combined`: CombinedPlanes, instead of the level's own; `clean`: radiance channels; `light`:
     /// kLightPlanes.

@@ -9,9 +9,8 @@ namespace vlx {
 
 namespace {
 
-constexpr float kFeatureFloor = 1e-4f;     // differences of a hundredth of a feature's scale are none
-constexpr double kAgreement = 1.0 / 1024;  // of radiance: half floats cannot tell such values apart
-constexpr float kFeatureWidth2 = 0.01f;    // (a tenth of a feature's scale)^2
+constexpr float kFeatureFloor = 1e-4f;   // differences of a hundredth of a feature's scale are none
+constexpr float kFeatureWidth2 = 0.01f;  // (a tenth of a feature's scale)^2
 
 /// weights[i] = nearExp(max(0, d[i])), summed into `total`, and into sums of each value and variance.
 VLX_WIDE void accumulate(const float* __restrict distances, int count, const float* const* values,

@@ -20,8 +20,7 @@ constexpr int kColours = 3;        // R, G, B carry the variogram
 constexpr int kCellsPerPixel = 4;  // along each axis: 16 cells a pixel
 constexpr int kMinData = 3;        // a variogram needs two distances
 constexpr int kDistanceClasses = 12;
-constexpr double kAgreement = 1.0 / 1024;  // of radiance: half floats cannot tell such values apart
-constexpr double kMinExponent = 0.25;      // lower ones are a nugget in all but name
+constexpr double kMinExponent = 0.25;  // lower ones are a nugget in all but name
 
 /// The index of the pixel of the region that holds a position.
 int pixelOf(const Window& pixels, double x, double y) {
