@@ -108,7 +108,8 @@ void bind(CLI::App& app, Options& o) {
     app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
         ->check(vlx::finitePositive())
         ->capture_default_str();
-    app.add_option("--strength", o.krige.strength, "krige: 0 keeps the plain average, 1 takes the estimate")
+    app.add_option("--strength", o.krige.strength,
+                   "krige: 0 keeps the plain average (of what --fireflies leaves), 1 takes the estimate")
         ->check(vlx::finiteWithin(0, 1))
         ->capture_default_str();
     app.add_option(

@@ -265,6 +265,46 @@ TEST(NeverSure, WideGapsArePredictedWithAnErrorThatGrows) {
     }
 }
 
+/// Each sample is `truth` times an exponential variable: as noisy as bright.
+SampleBuffer exponential(int size, int spp, const std::function<bool(int, int)>& there,
+                         const std::function<double(int, int)>& truth, unsigned seed = 9) {
+    return picture(size, {"R", "G", "B"}, seed, [&](int x, int y, Random& random, auto& samples) {
+        std::exponential_distribution<double> noise(1);
+        for (int s = 0; s < spp && there(x, y); ++s) {
+            const auto z = static_cast<float>(truth(x, y) * noise(random));
+            samples.push_back({z, z, z});
+        }
+    });
+}
+
+TEST(NeverSure, NoBorderShowsWhereNeighbourhoodsEndInAGap) {
+    const auto inside = [](int x, int y) { return x >= 27 && x < 70 && y >= 27 && y < 70; };
+    const SampleBuffer dump = exponential(
+        96, 16, [&](int x, int y) { return !inside(x, y); },
+        [](int x, int y) { return 0.5 + 0.004 * x + 0.002 * y; });
+    const Image image = reconstructDriftKriging(dump, {}).image;
+    for (int y = 30; y < 67; ++y)
+        for (int x = 30; x < 67; ++x)
+            for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}}) {
+                EXPECT_NEAR(image.at(x, y)[0], image.at(x + dx, y + dy)[0], 0.08) << x << " " << y;
+                const float here = deviation(image, x, y), there = deviation(image, x + dx, y + dy);
+                EXPECT_LT(std::max(here, there), 1.8f * std::min(here, there)) << x << " " << y;
+            }
+}
+
+TEST(NeverSure, APixelUnlikeAllOthersIsAsUncertainAsItsSamples) {
+    const auto all = [](int, int) { return true; };
+    const auto lone = [](int x, int y) { return x == 30 && y == 30 ? 50 : 0.2; };
+    double square = 0, predicted = 0;
+    for (unsigned seed = 1; seed <= 12; ++seed) {
+        const Image image = reconstructDriftKriging(exponential(64, 8, all, lone, seed), {}).image;
+        const double error = static_cast<double>(image.at(30, 30)[0]) - 50;
+        square += error * error;
+        predicted += static_cast<double>(deviation(image, 30, 30)) * deviation(image, 30, 30);
+    }
+    EXPECT_GT(predicted, square / 6);  // 12 errors of one standard deviation: less in one case of 10^3
+}
+
 TEST(NeverSure, APictureWithoutSamplesKnowsNothing) {
     const Image image = reconstructDriftKriging(greyWith(20, 0, [](int, int) { return false; }), {}).image;
     for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));

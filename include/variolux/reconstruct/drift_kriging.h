@@ -33,33 +33,35 @@
 ///    neighbourhoods that hold it, weighted by w over their noise.
 /// 5. *Models*: medium and strict, large and tolerant, small. Where few data are like the centre the medium
 ///    model keeps their noise: it is shrunk towards the small one by positive-part James-Stein, by how much
-///    of their difference the pixel's own noise explains, (h1 - h3)+^2 sum over colours of v / n; h is what
-///    the pixel's datum weighs in its estimate (the diagonal of the hat matrix), averaged over
-///    neighbourhoods. Models and the pixel's plain mean are combined per pixel by stacking (Breiman 1996):
-///    convex weights that predict half B from half A and the reverse, fitted over about 20 x 20 pixels; the
-///    plain mean enters only where it improves by one standard error.
+///    of their difference noise explains: half of what its own halves differ in, (A - B)^2 / 4, and half of
+///    (h1 - h3)+^2 sum over colours of v / n; h is what the pixel's datum weighs in its estimate (the
+///    diagonal of the hat matrix), averaged over neighbourhoods. Models and the pixel's plain mean are
+///    combined per pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the
+///    reverse, fitted over about 20 x 20 pixels; the plain mean enters only where it improves by one standard
+///    error.
 /// 6. *Half the resolution*: the same data, 2 x 2 pixels as one, are kriged by the same models, C. The
 ///    estimate K becomes K + w (L - K), L = K + up(C - down(K)), with the w in 0 to 1 by which each half's
 ///    correction predicts the other half's data best in 7 x 7 pixels (half_resolution.h). Noise of low
 ///    frequency, which neighbourhoods of a few pixels share, is less at half the resolution. Pictures of less
 ///    than 32 pixels along an axis have no such level.
-/// 7. *Outliers and light*: a pixel beyond the range of its eight neighbours moves towards them by how much
-/// of
-///    the excess its own noise explains. What fireflies lost in the 33 x 33 pixels around is given back in
-///    proportion to the light there, by how much of it is beyond two standard errors (finishing.h).
+/// 7. *Outliers and light*: a pixel beyond the range of its eight neighbours moves towards them by the share
+///    of the excess that its own noise explains. What fireflies lost in the 33 x 33 pixels around is given
+///    back in proportion to the light there, as far as it is beyond two standard errors (finishing.h).
 /// 8. *Error map*: the estimator's own variance. The noise of the halves' common data is estimated twice, and
 ///    half of each taken: by what the halves' combinations differ in, (A - B)^2 / 4 over 5 x 5 pixels of
 ///    alike features; and by the kriging variance of the neighbourhoods, v (1 + p) / sum w (p effective
 ///    functions), less what they spread about their mean, which averaging takes off. That spread is added, as
 ///    what the drift does not say, and so is what a model differs from the combination by beyond its own
 ///    variance; half the resolution mixes its own in by w, where that is less, and adds w (1 - w) (L - K)^2.
-///    Lost light is known to as many samples as lost it: y^2 times sum r^2 / (sum y)^2.
+///    Lost light is known to as many samples as lost it: y^2 times sum r^2 / (sum y)^2. A pixel's own
+///    scatter beyond two standard deviations of its mean counts by h^2.
 /// 9. *What samples do not say*: no pixel is exact but where the dump states an error variance of 0, there
 ///    and at all pixels that it was pooled over. Where not two of the n samples around a pixel differ, what
 ///    they did not see has a probability of up to 3 / n (95 % confidence): the variance of a sample is 3 / n
 ///    times the square of the pixel's level or the picture's mean. A pixel without samples, or without those
 ///    of a half, is no datum: it is predicted by the neighbourhoods that reach it, else (more than 5 pixels
-///    from any sample) read off means of blocks of 8 x 8 pixels, interpolated; its error grows by the
+///    from any sample) read off means of blocks of 8 x 8 pixels, interpolated, smoothly from half a
+///    neighbourhood's reach to the whole of it; its error grows by the
 ///    semivariance of the picture at the distance of the nearest samples, towards the field's own spread. Of
 ///    features, what exceeds their scale counts by its logarithm, and in a neighbourhood the few values that
 ///    lie farther from the range of all others than it is wide count as not known.
@@ -67,7 +69,6 @@
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
 /// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights
 /// too, so that dividing by it leaves no halos; it is kept within 0 to 1.
-///
 namespace vlx {
 
 /// What is given up for speed: models used, and how densely neighbourhoods overlap.
@@ -89,9 +90,9 @@ enum class Fireflies {
 struct DriftKrigingOptions {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;
-    double clamp = 10;                       ///< luminance, Fireflies::Clamp; > 0
-    double strength = 1;                     ///< 0: the plain mean, 1: the estimate; between: mixed linearly
-    bool standardFeatures = true;            ///< use albedo, N and Z where the dump has them
+    double clamp = 10;             ///< luminance, Fireflies::Clamp; > 0
+    double strength = 1;           ///< 0: the mean of what fireflies leaves, 1: the estimate; between: linear
+    bool standardFeatures = true;  ///< use albedo, N and Z where the dump has them
     std::vector<std::string> features = {};  ///< further channels to use as drift
     /// Further channels, or layers (radianceChannels), to estimate with the same weights: light groups.
     std::vector<std::string> radiance = {};

@@ -195,6 +195,8 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
         sharedVariance(x, y, shared);
         const double gap = data_.row(planes_.gap(), y)[x];
         const double strength = n > 0 ? strength_ : 1;
+        const double leverage = combined_.row(combinedPlanes_.leverage(), y)[x];
+        const bool twoHalves = data_.row(planes_.countA(), y)[x] > 0 && data_.row(planes_.countB(), y)[x] > 0;
         double back[3] = {};
         for (int c = 0; c < radiance_; ++c) {
             const double mean = plainMean(data_, planes_, c, x, y);
@@ -220,6 +222,13 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             variance += value * value * shares[static_cast<std::size_t>(4 * width_ + x)];
             if (gap > 0) variance += picture_.semivarianceAt(c, gap / scale_);
             const double meanVariance = static_cast<double>(variances_.row(c, y)[x]) / std::max(1.0, n);
+            // A pixel's own scatter beyond two standard deviations raises its variance, by as much as the
+            // pixel itself is in its estimate.
+            if (twoHalves) {
+                const double apart = static_cast<double>(data_.row(planes_.meanA() + c, y)[x]) -
+                                     static_cast<double>(data_.row(planes_.meanB() + c, y)[x]);
+                variance += leverage * leverage * std::max(0.0, apart * apart / 4 - 4 * meanVariance);
+            }
             out[radiance_ + c] = static_cast<float>(
                 exact ? 0 : std::sqrt(strength * variance + (1 - strength) * meanVariance));
         }

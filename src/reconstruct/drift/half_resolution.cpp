@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace vlx {
@@ -27,10 +28,11 @@ void halveRow(const PixelRows& fine, int width, int height, int radiance, int fe
         const auto put = [&](RowRing& ring, int plane, double value) {
             ring.row(plane, y)[x] = static_cast<float>(value);
         };
-        double parts = 0, stated = 1, count = 0;
+        double parts = 0, stated = 1, count = 0, gap = std::numeric_limits<double>::infinity();
         forParts(width, height, x, y, [&](int col, int row) {
             ++parts;
             stated = std::min(stated, static_cast<double>(data.row(planes.stated(), row)[col]));
+            gap = std::min(gap, static_cast<double>(data.row(planes.gap(), row)[col]));
         });
         for (int half = 0; half < 2; ++half) {
             double known = 0, inverse = 0;
@@ -54,6 +56,7 @@ void halveRow(const PixelRows& fine, int width, int height, int radiance, int fe
         }
         put(coarse.data, planes.count(), count);
         put(coarse.data, planes.stated(), stated);
+        put(coarse.data, planes.gap(), gap / 2);
         for (int k = 0; k < kSquaresPlanes; ++k) {
             double sum = 0;
             forParts(width, height, x, y,

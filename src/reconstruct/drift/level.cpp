@@ -137,6 +137,7 @@ void Level::finish(int until) {
     krige(until + kMaxReach);
     parallelFor(finishedRows_, until, [&](std::int64_t y) {
         for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
+        fillGaps(static_cast<int>(y));
         if (models_.size() > 1) shrinkRow(static_cast<int>(y));
         combination_.momentsRow(static_cast<int>(y));
     });
@@ -151,6 +152,7 @@ void Level::finishRow(std::size_t m, int y) {
     for (int x = 0; x < width_; ++x) {
         double variance[3] = {};
         double leverage = 0;
+        const float gap = pixels_.data.row(data.gap(), y)[x];
         double perSample = 1e-300;  // of noise, over colours
         for (int c = 0; c < 3; ++c) perSample += static_cast<double>(variances_.row(c, y)[x]) / 3;
         for (int half = 0; half < 2; ++half) {
@@ -164,7 +166,8 @@ void Level::finishRow(std::size_t m, int y) {
                 float& estimate = estimates_[m].row(out.half(half) + c, y)[x];
                 if (weight <= 0) {  // no neighbourhood with data reaches it
                     estimate = pixels_.data.row(data.mean(half) + c, y)[x];
-                    if (c < 3) variance[c] += 2 * static_cast<double>(variances_.row(c, y)[x]);
+                    // Of a gap's pixel the semivariance at its distance is added in the end.
+                    if (c < 3 && gap == 0) variance[c] += 2 * static_cast<double>(variances_.row(c, y)[x]);
                     continue;
                 }
                 const double shift = sums_[m].row(from + planes.sum(c), y)[x] / weight;
@@ -183,23 +186,53 @@ void Level::finishRow(std::size_t m, int y) {
     }
 }
 
-/// The first model towards the small one, pixel by pixel, by how much of their difference the pixel's own
-/// noise explains: a pixel with unlike features all around is left with its own noisy mean.
+/// Where a pixel lies in a gap, a model's neighbourhoods reach it with less and less to say: from half their
+/// reach to the whole of it the widest model takes its place, and that one's what is read off the means of
+/// blocks, so that no border shows where they end.
+void Level::fillGaps(int y) {
+    const ModelPlanes planes{radiance_};
+    const DataPlanes data{radiance_};
+    std::size_t widest = 0;
+    for (std::size_t m = 1; m < models_.size(); ++m)
+        if (models_[m].reach > models_[widest].reach) widest = m;
+    const auto mix = [](float& value, float other, float share) { value += share * (other - value); };
+    for (int x = 0; x < width_; ++x) {
+        const float gap = pixels_.data.row(data.gap(), y)[x];
+        if (gap == 0) continue;
+        const auto share = [&](std::size_t m) {
+            return std::clamp(2 * gap / static_cast<float>(models_[m].reach) - 1, 0.f, 1.f);
+        };
+        for (int k = 0; k < 2 * radiance_; ++k)
+            mix(estimates_[widest].row(k, y)[x], pixels_.data.row(k, y)[x], share(widest));
+        for (int c = 0; c < 3; ++c)
+            mix(estimates_[widest].row(planes.variance() + c, y)[x], 0, share(widest));
+        for (std::size_t m = 0; m < models_.size(); ++m)
+            for (int k = 0; k < planes.channels() && m != widest; ++k)
+                mix(estimates_[m].row(k, y)[x], estimates_[widest].row(k, y)[x], share(m));
+    }
+}
+
+/// The first model towards the small one, pixel by pixel, by how much of their difference noise explains: a
+/// pixel with unlike features all around is left with its own noisy mean. That noise is estimated twice, by
+/// what the first model's halves differ in and by what the pixel's own noise makes of their difference: half
+/// of each. The one is nothing where halves agree by chance, the other where a few alike pixels make both
+/// models speckled.
 void Level::shrinkRow(int y) {
     RowRing &first = estimates_.front(), &small = estimates_.back();
     const ModelPlanes planes{radiance_};
     for (int x = 0; x < width_; ++x) {
         const double n = std::max(1.f, pixels_.data.row(DataPlanes{radiance_}.count(), y)[x]);
-        double apart = 0, noise = 0;
+        double apart = 0, noise = 0, halves = 0;
         for (int c = 0; c < 3; ++c) {
             const double a = first.row(c, y)[x], b = first.row(radiance_ + c, y)[x];
             const double d = (a + b - small.row(c, y)[x] - small.row(radiance_ + c, y)[x]) / 2;
             apart += d * d;
             noise += static_cast<double>(variances_.row(c, y)[x]) / n;
+            halves += (a - b) * (a - b) / 4;
         }
         float* const leverage = first.row(planes.leverage(), y) + x;
         const double more = std::max(0.f, *leverage - small.row(planes.leverage(), y)[x]);
-        const auto kept = static_cast<float>(shrinkage(apart, more * more * noise));
+        const auto kept = static_cast<float>(shrinkage(apart, (halves + more * more * noise) / 2));
         for (int k = 0; k < 2 * radiance_; ++k) {
             const float towards = small.row(k, y)[x];
             first.row(k, y)[x] = towards + kept * (first.row(k, y)[x] - towards);

@@ -56,6 +56,7 @@ class Level {
     void krige(int until);
     void finish(int until);
     void finishRow(std::size_t m, int y);
+    void fillGaps(int y);
     void shrinkRow(int y);
 
     const SampleLayout& layout_;
