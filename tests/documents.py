@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Fails when a relative link or picture in a Markdown file leads nowhere, a heading that a link names is missing, or the front
-page outgrows 150 lines or 12 KB.
+"""Fails when a relative link or picture in a Markdown file leads nowhere, a heading that a link names is missing, a document names a
+path of one machine, or the front page outgrows 150 lines or 12 KB.
 
 Usage: documents.py [FOLDER]      (default: this repository; files that git knows, or all but build folders without git)
 """
@@ -58,10 +58,18 @@ def broken_links(root, name):
             yield f"{name}: {target}: no such heading"
 
 
+def machine_paths(root, name):
+    """Folders that a reader's machine has not; /usr and the like are everyone's, /tmp is where anyone may write."""
+    with open(os.path.join(root, name), encoding="utf-8") as file:
+        for number, line in enumerate(file, 1):
+            for path in re.findall(r"(?<![\w.$}])/(?:work|home|root|Users)/[^\s`)]*", line):
+                yield f"{name}:{number}: {path} is a path of one machine"
+
+
 def main():
     root = os.path.realpath(sys.argv[1] if len(sys.argv) > 1 else os.path.join(os.path.dirname(__file__), ".."))
     names = documents(root)
-    faults = [fault for name in names for fault in broken_links(root, name)]
+    faults = [fault for name in names for check in (broken_links, machine_paths) for fault in check(root, name)]
     with open(os.path.join(root, "README.md"), "rb") as file:
         text = file.read()
     if text.count(b"\n") > MOST_LINES:
