@@ -6,14 +6,14 @@
 #include <string>
 
 #include "reconstruct/common/wide.h"
+#include "reconstruct/drift/prefilter.h"
 #include "reconstruct/drift/stacking.h"
 
 namespace vlx {
 
 namespace {
 
-constexpr double kKnown = 4;             // (standard errors of lost light that are none)^2
-constexpr float kFeatureWidth2 = 0.01f;  // (a tenth of a feature's scale)^2
+constexpr double kKnown = 4;  // (standard errors of lost light that are none)^2
 
 /// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
 double coverage(double alpha) {
@@ -250,7 +250,7 @@ float Finishing::likeness(int x, int y, int col, int row) const {
     float d = 0;
     for (int f = 0; f < layout_.features; ++f) {
         const float apart = features_.row(f, row)[col] - features_.row(f, y)[x];
-        d += apart * apart / (kFeatureWidth2 + 2 * features_.row(layout_.features + f, y)[x]);
+        d += apart * apart / (kAlikeFeatures2 + 2 * features_.row(layout_.features + f, y)[x]);
     }
     return nearExp(d);
 }

@@ -9,8 +9,7 @@ namespace vlx {
 
 namespace {
 
-constexpr float kFeatureFloor = 1e-4f;   // differences of a hundredth of a feature's scale are none
-constexpr float kFeatureWidth2 = 0.01f;  // (a tenth of a feature's scale)^2
+constexpr float kFeatureFloor = 1e-4f;  // differences of a hundredth of a feature's scale are none
 
 /// weights[i] = nearExp(max(0, d[i])), summed into `total`, and into sums of each value and variance.
 VLX_WIDE void accumulate(const float* __restrict distances, int count, const float* const* values,
@@ -134,7 +133,7 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
     for (std::size_t f = 0; f < count; ++f) {
         here[f] = features.row(static_cast<int>(f), y);
         const float* errors = features.row(featureCount + static_cast<int>(f), y);
-        for (std::size_t i = 0; i < w; ++i) scales[f * w + i] = 1 / (kFeatureWidth2 + 2 * errors[i]);
+        for (std::size_t i = 0; i < w; ++i) scales[f * w + i] = 1 / (kAlikeFeatures2 + 2 * errors[i]);
         scale[f] = scales.data() + f * w;
     }
     float* out[kSquaresPlanes];

@@ -9,6 +9,9 @@
 /// What kriging needs besides the means: features without noise, error variances without noise or bias.
 namespace vlx {
 
+/// Square of the difference that makes pixels unlike where error variances are pooled: a tenth of a feature's
+/// scale.
+inline constexpr float kAlikeFeatures2 = 0.01f;
 inline constexpr int kFeatureReach = 5;   ///< pixels around a pixel that its features are averaged over
 inline constexpr int kVarianceReach = 5;  ///< and its error variance
 
