@@ -182,7 +182,8 @@ void bind(CLI::App& app, Options& o) {
     app.add_option(
            "--max-memory", o.maxMemory,
            "krige: memory of the process at most, for example 2G or 500M (10^9, 10^6 bytes): fewer rows "
-           "are read at a time. The result does not depend on it")
+           "are read at a time, and less than a picture of that width needs (170M or more) is refused. The "
+           "result does not depend on it")
         ->option_text("SIZE");
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
         ->check(CLI::Range(0, 1024))

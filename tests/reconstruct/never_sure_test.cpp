@@ -175,6 +175,31 @@ TEST(NeverSure, ABlackPictureMayHaveMissedLight) {
     }
 }
 
+// What scatters by a thousandth of the picture's level and what does not scatter at all have missed the same.
+TEST(NeverSure, TheErrorMapHasNoBorderInTheDark) {
+    const SampleBuffer dump =
+        picture(96, {"R", "G", "B"}, 5, [](int x, int, Random& random, auto& samples) {
+            std::exponential_distribution<float> light(1);
+            const float level = x < 32 ? 0.5f : x < 64 ? 5e-4f : 0.f;
+            for (int s = 0; s < 8; ++s) {
+                const float z = level * light(random);
+                samples.push_back({z, z / 2, z / 4});
+            }
+        });
+    const Image image = reconstructDriftKriging(dump, {}).image;
+    for (int colour = 0; colour < 3; ++colour) {
+        const auto column = [&](int x) {
+            double sum = 0;
+            for (int y = 0; y < 96; ++y) sum += static_cast<double>(deviation(image, x, y, colour));
+            return sum / 96;
+        };
+        for (int x = 56; x < 95; ++x) {
+            EXPECT_LT(column(x + 1), 1.5 * column(x)) << x << " of colour " << colour;
+            EXPECT_LT(column(x), 1.5 * column(x + 1)) << x << " of colour " << colour;
+        }
+    }
+}
+
 // Hundreds of samples around that all agree: sharp, with an error that is small.
 TEST(NeverSure, NoiseFreeAreasStaySharp) {
     const auto truth = [](int x, int y) { return x < 30 ? 0.5 + 0.3 * ((x / 4 + y / 4) % 2) : 1.0; };

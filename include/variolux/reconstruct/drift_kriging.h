@@ -56,9 +56,11 @@
 ///    Lost light is known to as many samples as lost it: y^2 times sum r^2 / (sum y)^2. A pixel's own
 ///    scatter beyond two standard deviations of its mean counts by h^2.
 /// 9. *What samples do not say*: no pixel is exact but where the dump states an error variance of 0, there
-///    and at all pixels that it was pooled over. Where not two of the n samples around a pixel differ, what
-///    they did not see has a probability of up to 3 / n (95 % confidence): the variance of a sample is 3 / n
-///    times the square of the pixel's level or the picture's mean. A pixel without samples, or without those
+///    and at all pixels that it was pooled over. What the n samples around a pixel did not see has a
+///    probability of up to 3 / n (95 % confidence): the variance of a sample is larger by 3 / n times the
+///    square of the picture's mean level, or of the pixel's own where no two of them differ; and what a
+///    window twice as wide met counts as far as chance explains that the pixel's own did not
+///    (drift/prefilter.h). A pixel without samples, or without those
 ///    of a half, is no datum: it is predicted by the neighbourhoods that reach it, else (more than 5 pixels
 ///    from any sample) read off means of blocks of 8 x 8 pixels, interpolated, smoothly from half a
 ///    neighbourhood's reach to the whole of it; its error grows by the

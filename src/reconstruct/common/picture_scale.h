@@ -25,6 +25,8 @@ struct PictureScale {
     /// pixels have but one sample. The last is the field's spread.
     std::vector<double> semivariance[3];
 
+    /// 1 / the sum of the variances.
+    double unit() const { return 1 / (variance[0] + variance[1] + variance[2]); }
     /// Standard deviation of the mean of `samples` samples that all have the same value.
     double agreedDeviation(double value, double samples) const;
     /// Standard deviation of colour c about 0: of a pixel that no sample says anything of.

@@ -27,12 +27,11 @@ void addFeatures(const DumpHeader& header, const std::vector<std::string>& chann
     ++layout.groups;
 }
 
-void requireChannel(const SampleSource& dump, const SampleLayout& layout, const std::string& channel) {
+void requireChannel(const SampleSource& dump, const SampleLayout& layout, const std::string& channel,
+                    const std::string& option) {
     if (findChannel(dump.header(), channel) < 0)
         throw Error(dump.path(),
-                    "expected a channel '" + channel +
-                        "' (of --feature, --radiance, or of --scale, which needs positions), found "
-                        "none of that name");
+                    "expected a channel '" + channel + "' (for " + option + "), found none of that name");
     if (std::find(layout.names.begin(), layout.names.end(), channel) != layout.names.end())
         throw Error(
             dump.path(),
@@ -135,7 +134,7 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOpti
         layout.names.emplace_back("A");
     }
     for (const std::string& channel : furtherRadiance(header, options)) {
-        requireChannel(dump, layout, channel);
+        requireChannel(dump, layout, channel, "--radiance");
         layout.names.push_back(channel);
     }
     layout.radiance = static_cast<int>(layout.names.size());
@@ -146,7 +145,7 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOpti
     const std::size_t first = layout.scale.size();
     if (options.standardFeatures) addFeatures(header, {"Z"}, layout);
     for (const std::string& channel : options.features) {
-        requireChannel(dump, layout, channel);
+        requireChannel(dump, layout, channel, "--feature");
         addFeatures(header, {channel}, layout);
     }
     measureScales(dump, layout, first);
@@ -155,7 +154,8 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOpti
         layout.names.emplace_back("sample.replicate");
     }
     if (options.scale > 1) {
-        for (const char* channel : {"sample.x", "sample.y"}) requireChannel(dump, layout, channel);
+        for (const char* channel : {"sample.x", "sample.y"})
+            requireChannel(dump, layout, channel, "--scale, which needs positions");
         layout.position = static_cast<int>(layout.names.size());
         layout.names.insert(layout.names.end(), {"sample.x", "sample.y"});
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cassert>
 #include <cstddef>
 #include <cstdlib>
@@ -9,7 +10,8 @@
 namespace vlx {
 
 /// Rows of several planes of floats, of which only the last `capacity` are kept: row y overwrites row
-/// y - capacity. Rows are counted from 0; contiguous along x; zeros until written.
+/// y - capacity. Rows are counted from 0; contiguous along x; zeros until written. Builds with assertions
+/// notice who asks for a row that was overwritten: a capacity that is too small.
 class RowRing {
   public:
     RowRing() = default;
@@ -20,6 +22,9 @@ class RowRing {
           // calloc: large blocks are only asked for here, and taken row by row as they are written.
           values_(static_cast<float*>(std::calloc(bytes() / sizeof(float), sizeof(float)))) {
         if (!values_ && bytes() > 0) throw std::bad_alloc();
+#ifndef NDEBUG
+        newest_ = std::make_unique<std::atomic<int>[]>(static_cast<std::size_t>(capacity));
+#endif
     }
 
     int channels() const { return channels_; }
@@ -34,10 +39,23 @@ class RowRing {
   private:
     std::size_t offset(int channel, int y) const {
         assert(y >= 0 && channel >= 0 && channel < channels_);
+        assert(isKept(y));
         return (static_cast<std::size_t>(y % capacity_) * static_cast<std::size_t>(channels_) +
                 static_cast<std::size_t>(channel)) *
                width_;
     }
+
+#ifndef NDEBUG
+    /// Whether no later row was asked for in y's place.
+    bool isKept(int y) const {
+        std::atomic<int>& newest = newest_[static_cast<std::size_t>(y % capacity_)];
+        int before = newest.load(std::memory_order_relaxed);
+        while (before < y && !newest.compare_exchange_weak(before, y, std::memory_order_relaxed)) {
+        }
+        return before <= y;
+    }
+    std::unique_ptr<std::atomic<int>[]> newest_;
+#endif
 
     std::size_t width_ = 0;
     int channels_ = 0;

@@ -87,7 +87,7 @@ class Pipeline {
           fine_(
               layout_, modelsOf(options.quality, false), width_, height_, halved_ ? kAheadRows : 0, picture_,
               [this](int until) { fill(until); }, report_, clock_),
-          pixels_(dump, layout_, planes_, options.scale, width_, height_,
+          pixels_(dump, layout_, planes_, picture_, options.scale, width_, height_,
                   options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
           differences_(width_, halved_ ? Correction::differencePlanes(radiance_) : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
@@ -99,6 +99,7 @@ class Pipeline {
             coarse_ = std::make_unique<Level>(
                 layout_, modelsOf(options.quality, true), (width_ + 1) / 2, (height_ + 1) / 2, kAheadRows,
                 picture_, [this](int until) { fill(2 * until); }, report_, clock_);
+            fine_.lookAt(*coarse_);
             correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
                                                        corrected_);
         }

@@ -38,7 +38,7 @@ Level::Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models,
               RowRing(width, kSquaresPlanes, kept(kRawRows + ahead)),
               RowRing(width, 2 * layout.features, kept(kRawRows + ahead))},
       features_(width, 2 * layout.features, kept(kFeatureRows)),
-      variances_(width, 3, kept(kFeatureRows)),
+      variances_(width, kVariancePlanes, kept(kFeatureRows)),
       moments_(width, Combination::momentPlanes(static_cast<int>(models_.size())), kept(kEstimateRows)),
       combined_(width, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
       combination_(radiance_, width, height, pixels_.data, variances_, estimates_, moments_, combined_) {
@@ -88,11 +88,13 @@ void Level::prefilter(int until) {
 void Level::smooth(int until) {
     until = std::min(until, height_);
     if (varianceRows_ >= until) return;
+    if (wider_) wider_->smooth(until / 2 + 1);
     prefilter(until + kVarianceReach);
     source_(until + kVarianceReach);
     parallelFor(varianceRows_, until, [&](std::int64_t y) {
         smoothVariances(pixels_.squares, pixels_.data, {radiance_}, features_, layout_.features, picture_,
-                        static_cast<int>(y), width_, height_, variances_);
+                        wider_ ? &wider_->variances_ : nullptr, static_cast<int>(y), width_, height_,
+                        variances_);
     });
     varianceRows_ = until;
     clock_.addTo("variances");

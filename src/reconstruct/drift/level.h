@@ -38,6 +38,8 @@ class Level {
     Level(const Level&) = delete;
     Level& operator=(const Level&) = delete;
 
+    /// Lets this level's variances look at those of a level of half the resolution, which sees as far again.
+    void lookAt(Level& wider) { wider_ = &wider; }
     /// Lets each stage start just far enough above row `first` of the combination for that row to be what it
     /// is in the whole picture. The first row of data that is needed.
     int startAbove(int first);
@@ -71,6 +73,7 @@ class Level {
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: ModelPlanes
     RowRing moments_, combined_;
     Combination combination_;
+    Level* wider_ = nullptr;
     int featureRows_ = 0, varianceRows_ = 0, krigedRows_ = 0, zeroedRows_ = 0, finishedRows_ = 0,
         combinedRows_ = 0;
 };

@@ -133,6 +133,8 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
     for (int c = 0; c < 3; ++c) out_.squares.row(c, y)[x] = squares[c];
     out_.squares.row(3, y)[x] = freedom;
     out_.squares.row(4, y)[x] = n;
+    const double all = unit_ * (static_cast<double>(squares[0]) + squares[1] + squares[2]);
+    out_.squares.row(5, y)[x] = static_cast<float>(all * all);
 }
 
 /// Mean of a half. Where a pixel has samples, but none of it, what its neighbours have on average stands in,

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/pixel_statistics.h"
 #include "reconstruct/common/row_ring.h"
 #include "reconstruct/drift/gap_field.h"
@@ -42,8 +43,9 @@ inline double plainMean(const RowRing& data, const DataPlanes& planes, int chann
 /// Degrees of freedom of a pixel of one sample, whose variance is what its neighbours differ from it by.
 inline constexpr float kBorrowedFreedom = 1e-3f;
 
-/// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples.
-inline constexpr int kSquaresPlanes = 5;
+/// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples; the square of the sums'
+/// sum over R, G, B, in the picture's own unit.
+inline constexpr int kSquaresPlanes = 6;
 
 /// What kriging starts from, a ring of rows each.
 struct PixelRows {
@@ -63,12 +65,14 @@ struct LimitedRow {
 class PixelData {
   public:
     /// `scale`: pixels of the image along each axis for one of the dump; `robust`: Fireflies::Robust.
-    PixelData(const SampleSource& dump, const SampleLayout& layout, const GatheredPlanes& planes, int scale,
-              int width, int height, bool robust, RowRing& gathered, PixelRows& out)
+    PixelData(const SampleSource& dump, const SampleLayout& layout, const GatheredPlanes& planes,
+              const PictureScale& picture, int scale, int width, int height, bool robust, RowRing& gathered,
+              PixelRows& out)
         : dump_(dump),
           layout_(layout),
           planes_(planes),
           dataPlanes_{layout.radiance},
+          unit_(picture.unit()),
           scale_(scale),
           width_(width),
           height_(height),
@@ -102,6 +106,7 @@ class PixelData {
     const SampleLayout& layout_;
     const GatheredPlanes& planes_;
     DataPlanes dataPlanes_;
+    double unit_;  // of variance
     int scale_, width_, height_, radiance_;
     bool robust_;
     RowRing& gathered_;

@@ -53,6 +53,20 @@ VLX_WIDE void addWeighted(const float* const* there, const float* const* here, c
     }
 }
 
+/// F sum w T^2 / (sum w T)^2; 0 where nothing scatters, or so much that squares of it are no numbers.
+double rarityOf(double scatter, double squares, double freedom) {
+    const double rarity = freedom * squares / (scatter * scatter);
+    return scatter > 0 && std::isfinite(rarity) ? rarity : 0;
+}
+
+/// The degrees of freedom that the wide window's variance counts for beside the own ones.
+double sharedFreedom(double scatter, double freedom, double rarity, double wideVariance, double wideRarity) {
+    if (wideRarity == 0) return 0;
+    const double r = rarity > 0 ? std::min(rarity, wideRarity) : wideRarity;
+    const double met = scatter / (wideVariance * r), expected = freedom / r;
+    return r / (1 + 2 * (expected - met + (met > 0 ? met * std::log(met / expected) : 0)));
+}
+
 }  // namespace
 
 void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
@@ -125,8 +139,8 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
 }
 
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
-                     const RowRing& features, int featureCount, const PictureScale& picture, int y, int width,
-                     int height, RowRing& variances) {
+                     const RowRing& features, int featureCount, const PictureScale& picture,
+                     const RowRing* wide, int y, int width, int height, RowRing& variances) {
     const auto count = static_cast<std::size_t>(featureCount), w = static_cast<std::size_t>(width);
     std::vector<float> scales(count * w), sums(kSquaresPlanes * w), weights(w);
     std::vector<const float*> here(count), there(count), scale(count);
@@ -146,27 +160,37 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
             addWeighted(there.data(), here.data(), scale.data(), featureCount, in, std::max(0, -dx),
                         std::min(width, width - dx), dx, weights.data(), out);
     }
-    for (int c = 0; c < 3; ++c) {
-        float* result = variances.row(c, y);
-        for (std::size_t i = 0; i < w; ++i) {
+    for (std::size_t i = 0; i < w; ++i) {
+        const auto sum = [&](int plane) { return static_cast<double>(out[plane][i]); };
+        const auto around = [&](int plane) {
+            return static_cast<double>(wide->row(plane, y / 2)[i / 2]);
+        };
+        const double freedom = sum(3), scatter = sum(0) + sum(1) + sum(2);
+        const double rarity = rarityOf(scatter * picture.unit(), sum(5), freedom);
+        variances.row(3, y)[i] = static_cast<float>(rarity);
+        const bool stated = data.row(planes.stated(), y)[i] > 0;
+        double more = 0;
+        if (wide && !stated && freedom > 0)
+            more = sharedFreedom(scatter, freedom, rarity, around(0) + around(1) + around(2), around(3));
+        for (int c = 0; c < 3; ++c) {
             double variance = picture.variance[c];
-            if (out[3][i] > 0) {
-                variance = static_cast<double>(out[c][i] / out[3][i]);
+            if (freedom > 0) {
+                variance = sum(c) / freedom;
+                if (more > 0) variance = (sum(c) + more * around(c)) / (freedom + more);
                 const auto mean = [&](int half) {
                     return std::abs(static_cast<double>(data.row(planes.mean(half) + c, y)[i]));
                 };
                 const double level = std::max(mean(0), mean(1));
-                const bool stated = data.row(planes.stated(), y)[i] > 0;
-                if (!stated && variance <= kAgreement * kAgreement * level * level)
-                    variance = std::max(variance, unseenVariance(static_cast<double>(out[4][i]),
-                                                                 std::max(level, picture.level)));
-                else if (!stated && out[3][i] < 1) {  // a few pairs may be alike by chance
-                    constexpr float kPicture = 2 * kBorrowedFreedom;
-                    variance = (static_cast<double>(out[c][i]) + kPicture * picture.variance[c]) /
-                               static_cast<double>(out[3][i] + kPicture);
+                const bool agree = variance <= kAgreement * kAgreement * level * level;
+                if (!stated && !agree && freedom < 1) {  // a few pairs may be alike by chance
+                    constexpr double kPicture = 2 * kBorrowedFreedom;
+                    variance = (freedom * variance + kPicture * picture.variance[c]) / (freedom + kPicture);
                 }
+                if (!stated)
+                    variance +=
+                        unseenVariance(sum(4), agree ? std::max(level, picture.level) : picture.level);
             }
-            result[i] = static_cast<float>(variance);
+            variances.row(c, y)[i] = static_cast<float>(variance);
         }
     }
 }

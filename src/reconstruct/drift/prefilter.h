@@ -14,6 +14,8 @@ namespace vlx {
 inline constexpr float kAlikeFeatures2 = 0.01f;
 inline constexpr int kFeatureReach = 5;   ///< pixels around a pixel that its features are averaged over
 inline constexpr int kVarianceReach = 5;  ///< and its error variance
+/// Variance of one sample of R, G, B, and how many degrees of freedom it takes to meet what makes it.
+inline constexpr int kVariancePlanes = 4;
 
 /// Prefilters the features (`raw`: f of them, then the error variances of their means) of the rows
 /// [y, y + kTile) at columns [x, x + kTile) (cut to the image): non-local means in each group, weights
@@ -23,15 +25,25 @@ inline constexpr int kVarianceReach = 5;  ///< and its error variance
 void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
                        RowRing& features);
 
-/// Variance of one sample of R, G, B for the pixels of row y: sum w S / sum w (n - 1) over the pixels within
-/// kVarianceReach, S their sums of squares and n their counts (`squares`: kSquaresPlanes),
+/// Variance of one sample of R, G, B for the pixels of row y: V = sum w S / F, F = sum w (n - 1), over the
+/// pixels within kVarianceReach, S their sums of squares and n their counts (`squares`: kSquaresPlanes),
 ///     w = exp(-sum over features of df^2 / (0.1^2 + 2 v)),   v the pixel's own feature error variance.
-/// Where they agree (within the rounding of half floats) and the dump does not state so, unseenVariance() of
-/// their sum w n samples and of the pixel's own mean or the picture's, whichever is larger; where no pixel
-/// has two samples, the picture's counts as two more pixels; where none has a neighbour to compare it with,
-/// it stands alone. Writes planes 0 to 2: above 0 but where the dump states 0.
+///
+/// What scatters may be rare. r = F sum w T^2 / (sum w T)^2, T a pixel's S over R, G and B, is in how many
+/// degrees of freedom it is met once (where noise is alike everywhere, those of one pixel). `wide` (null:
+/// none) holds V' and r' of the level of half the resolution, whose windows are twice as wide: what was
+/// met there is not denied here, as far as chance explains that it was not,
+///     V = (sum w S + R V') / (F + R),   R = r / (1 + 2 (e - m + m ln(m / e))),   r = min(r, r'),
+/// where e = F / r meetings were expected and m = sum w T / (r T') were seen: 2 (...) is the deviance of
+/// Poisson's distribution.
+///
+/// unseenVariance() of the sum w n samples is added, of the picture's level; where samples agree (within the
+/// rounding of half floats), of their own if that is larger. Where no pixel has two samples, the picture's
+/// variance counts as two more pixels; where none has a neighbour to compare it with, it stands alone. Where
+/// the dump states the variances, nothing is added to them.
+/// Writes kVariancePlanes: the variances, above 0 but where the dump states 0, and r (0: nothing scatters).
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
-                     const RowRing& features, int featureCount, const PictureScale& picture, int y, int width,
-                     int height, RowRing& variances);
+                     const RowRing& features, int featureCount, const PictureScale& picture,
+                     const RowRing* wide, int y, int width, int height, RowRing& variances);
 
 }  // namespace vlx
