@@ -43,8 +43,8 @@ inline double plainMean(const RowRing& data, const DataPlanes& planes, int chann
 /// Degrees of freedom of a pixel of one sample, whose variance is what its neighbours differ from it by.
 inline constexpr float kBorrowedFreedom = 1e-3f;
 
-/// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples; the square of the sums'
-/// sum over R, G, B, in the picture's own unit.
+/// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples; the square of the
+/// sums' sum over R, G, B, in the picture's own unit.
 inline constexpr int kSquaresPlanes = 6;
 
 /// What kriging starts from, a ring of rows each.
