@@ -58,7 +58,7 @@
 /// 9. *What samples do not say*: no pixel is exact but where the dump states an error variance of 0, there
 ///    and at all pixels that it was pooled over. What the n samples around a pixel did not see has a
 ///    probability of up to 3 / n (95 % confidence): the variance of a sample is larger by 3 / n times the
-///    square of the picture's mean level, or of the pixel's own where no two of them differ; and what a
+///    square of the picture's mean level, or of the pixel's own where no two of them differ; there, what a
 ///    window twice as wide met counts as far as chance explains that the pixel's own did not
 ///    (drift/prefilter.h). A pixel without samples, or without those
 ///    of a half, is no datum: it is predicted by the neighbourhoods that reach it, else (more than 5 pixels

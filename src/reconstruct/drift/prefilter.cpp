@@ -59,14 +59,6 @@ double rarityOf(double scatter, double squares, double freedom) {
     return scatter > 0 && std::isfinite(rarity) ? rarity : 0;
 }
 
-/// The degrees of freedom that the wide window's variance counts for beside the own ones.
-double sharedFreedom(double scatter, double freedom, double rarity, double wideVariance, double wideRarity) {
-    if (wideRarity == 0) return 0;
-    const double r = rarity > 0 ? std::min(rarity, wideRarity) : wideRarity;
-    const double met = scatter / (wideVariance * r), expected = freedom / r;
-    return r / (1 + 2 * (expected - met + (met > 0 ? met * std::log(met / expected) : 0)));
-}
-
 }  // namespace
 
 void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
@@ -162,33 +154,30 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
     }
     for (std::size_t i = 0; i < w; ++i) {
         const auto sum = [&](int plane) { return static_cast<double>(out[plane][i]); };
-        const auto around = [&](int plane) {
-            return static_cast<double>(wide->row(plane, y / 2)[i / 2]);
-        };
-        const double freedom = sum(3), scatter = sum(0) + sum(1) + sum(2);
-        const double rarity = rarityOf(scatter * picture.unit(), sum(5), freedom);
-        variances.row(3, y)[i] = static_cast<float>(rarity);
+        const auto around = [&](int plane) { return static_cast<double>(wide->row(plane, y / 2)[i / 2]); };
+        const double freedom = sum(3);
+        variances.row(3, y)[i] =
+            static_cast<float>(rarityOf((sum(0) + sum(1) + sum(2)) * picture.unit(), sum(5), freedom));
         const bool stated = data.row(planes.stated(), y)[i] > 0;
-        double more = 0;
-        if (wide && !stated && freedom > 0)
-            more = sharedFreedom(scatter, freedom, rarity, around(0) + around(1) + around(2), around(3));
         for (int c = 0; c < 3; ++c) {
             double variance = picture.variance[c];
             if (freedom > 0) {
                 variance = sum(c) / freedom;
-                if (more > 0) variance = (sum(c) + more * around(c)) / (freedom + more);
                 const auto mean = [&](int half) {
                     return std::abs(static_cast<double>(data.row(planes.mean(half) + c, y)[i]));
                 };
-                const double level = std::max(mean(0), mean(1));
-                const bool agree = variance <= kAgreement * kAgreement * level * level;
-                if (!stated && !agree && freedom < 1) {  // a few pairs may be alike by chance
+                const double own = std::max(mean(0), mean(1));
+                const bool agree = variance <= kAgreement * kAgreement * own * own;
+                if (agree && !stated && wide && around(3) > 0) {
+                    const double more = around(3) / (1 + 2 * freedom / around(3));
+                    variance = (sum(c) + more * around(c)) / (freedom + more);
+                }
+                if (!agree && !stated && freedom < 1) {  // a few pairs may be alike by chance
                     constexpr double kPicture = 2 * kBorrowedFreedom;
                     variance = (freedom * variance + kPicture * picture.variance[c]) / (freedom + kPicture);
                 }
                 if (!stated)
-                    variance +=
-                        unseenVariance(sum(4), agree ? std::max(level, picture.level) : picture.level);
+                    variance += unseenVariance(sum(4), agree ? std::max(own, picture.level) : picture.level);
             }
             variances.row(c, y)[i] = static_cast<float>(variance);
         }

@@ -31,17 +31,16 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
 ///
 /// What scatters may be rare. r = F sum w T^2 / (sum w T)^2, T a pixel's S over R, G and B, is in how many
 /// degrees of freedom it is met once (where noise is alike everywhere, those of one pixel). `wide` (null:
-/// none) holds V' and r' of the level of half the resolution, whose windows are twice as wide: what was
-/// met there is not denied here, as far as chance explains that it was not,
-///     V = (sum w S + R V') / (F + R),   R = r / (1 + 2 (e - m + m ln(m / e))),   r = min(r, r'),
-/// where e = F / r meetings were expected and m = sum w T / (r T') were seen: 2 (...) is the deviance of
-/// Poisson's distribution.
+/// none) holds V' and r' of the level of half the resolution, whose windows are twice as wide. Where the
+/// samples of the own window agree (within the rounding of half floats) though F / r' meetings were expected,
+/// what was met there is not denied here, as far as chance explains it:
+///     V = R V' / (F + R),    R = r' / (1 + 2 F / r'):  2 F / r' is the deviance of none (Poisson).
 ///
-/// unseenVariance() of the sum w n samples is added, of the picture's level; where samples agree (within the
-/// rounding of half floats), of their own if that is larger. Where no pixel has two samples, the picture's
-/// variance counts as two more pixels; where none has a neighbour to compare it with, it stands alone. Where
-/// the dump states the variances, nothing is added to them.
-/// Writes kVariancePlanes: the variances, above 0 but where the dump states 0, and r (0: nothing scatters).
+/// unseenVariance() of the sum w n samples is added, of the picture's level; where samples agree, of their
+/// own if that is larger. Where no pixel has two samples, the picture's variance counts as two more pixels;
+/// where none has a neighbour to compare it with, it stands alone. Where the dump states the variances,
+/// nothing is added to them. Writes kVariancePlanes: the variances, above 0 but where the dump states 0, and
+/// r (0: nothing scatters).
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
                      const RowRing& features, int featureCount, const PictureScale& picture,
                      const RowRing* wide, int y, int width, int height, RowRing& variances);
