@@ -8,6 +8,7 @@
 #include "geostat/entry_error.h"
 #include "geostat/kernels.h"
 #include "geostat/kriging_names.h"
+#include "geostat/more_digits.h"
 
 namespace vlx {
 /// One target: a point, or the points of a block with weights that sum to 1.
@@ -17,6 +18,38 @@ struct KrigingSystem::Block {
     bool isPoint = true;
     bool valid = true;
 };
+
+namespace {
+
+/// The mean covariance, or semivariance, between the points of a block. Blocks that are one footprint moved
+/// have the same: it is computed once.
+class Footprint {
+  public:
+    double meanInside(const MatrixXd& places, const VectorXd& weights, const VariogramModel& model,
+                      bool semivariances) {
+        MatrixXd offsets = places.rowwise() - places.row(0);
+        if (offsets.rows() == offsets_.rows() && offsets == offsets_ && weights == weights_) return mean_;
+        offsets_ = std::move(offsets);
+        weights_ = weights;
+        mean_ = 0;
+        for (Index a = 0; a < places.rows(); ++a) {
+            for (Index b = 0; b < a; ++b) {
+                const double h = (offsets_.row(a) - offsets_.row(b)).norm();
+                mean_ += 2 * weights_[a] * weights_[b] *
+                         (semivariances ? semivariance(model, h) : covariance(model, h));
+            }
+            if (!semivariances) mean_ += weights_[a] * weights_[a] * model.sill();
+        }
+        return mean_;
+    }
+
+  private:
+    MatrixXd offsets_;
+    VectorXd weights_;
+    double mean_ = 0;
+};
+
+}  // namespace
 
 KrigingTargets blockTargets(const MatrixXd& centres, const MatrixXd& offsets, const VectorXd& weights) {
     KrigingTargets targets;
@@ -31,7 +64,8 @@ KrigingTargets blockTargets(const MatrixXd& centres, const MatrixXd& offsets, co
     return targets;
 }
 
-KrigingSystem::KrigingSystem(const KrigingProblem& problem) : problem_(problem) {
+KrigingSystem::KrigingSystem(const KrigingProblem& problem, const MoreDigits* moreDigits)
+    : problem_(problem), moreDigits_(moreDigits) {
     if (!validate()) {
         report_.status = KrigingStatus::InvalidInput;
         return;
@@ -148,7 +182,7 @@ void KrigingSystem::completeReport() {
     if (system.merged > 0) separate() << system.merged << " coincident data merged";
     if (system.generalisedCovariance) separate() << "generalised covariance";
     if (!system.message.empty()) separate() << system.message;
-    prepareMoreDigits();
+    if (moreDigits_) (this->*moreDigits_->prepare)();
     if (report_.droppedDrift < system.droppedDrift)
         separate() << system.droppedDrift - report_.droppedDrift << " of them kept with more digits";
     report_.message = text.str();
@@ -177,7 +211,8 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
     const Index m = targets.count(), n = errors_.size(), q = external_.cols();
     const bool generalised = report_.generalisedCovariance;
     const bool field = quantity == KrigingQuantity::Field;
-    const bool shapes = targets.points.cols() == problem_.positions.cols() &&
+    const bool shapes = targets.points.cols() == problem_.positions.cols() && targets.cellAxes >= 0 &&
+                        targets.cellAxes <= targets.points.cols() &&
                         (targets.weights.size() == 0 || targets.weights.size() == targets.points.rows()) &&
                         (q == 0 || (targets.externalDrift.rows() == m && targets.externalDrift.cols() == q));
 
@@ -189,6 +224,7 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
     lower.drift = MatrixXd::Zero(m, driftColumns());
     const VectorXd centre = place(origin_.transpose()).transpose();
     VectorXd column(places_.rows() + 8);  // whole vectors are written
+    Footprint footprint;
     for (Index t = 0; shapes && t < m; ++t) {
         const Block target = block(targets, t);
         if (!target.valid) continue;
@@ -208,7 +244,7 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
             continue;
         }
         const MatrixXd places = place(target.points);
-        double within = 0;   // mean covariance, or semivariance, inside the block
+        const double within = footprint.meanInside(places, target.weights, model_, generalised);
         double outward = 0;  // generalised: mean semivariance between centre and block
         for (Index a = 0; a < places.rows(); ++a) {
             const VectorXd point = places.row(a).transpose();
@@ -224,12 +260,6 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
                                       column.data());
                 c0 += target.weights[a] * column.head(n);
             }
-            for (Index b = 0; b < a; ++b) {
-                const double h = (places.row(a) - places.row(b)).norm();
-                within += 2 * target.weights[a] * target.weights[b] *
-                          (generalised ? semivariance(model_, h) : covariance(model_, h));
-            }
-            if (!generalised) within += target.weights[a] * target.weights[a] * structureSill_;
         }
         lower.entryError[t] = kEntryRounding * (generalised ? 4 * level_ + 3 * outward : structureSill_);
         if (problem_.transform.size() > 0)
@@ -239,14 +269,18 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
         if (generalised)
             lower.variance[t] = (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +
                                 level_ * (2 * sum - sum * sum) + 2 * sum * outward - within;
-        if (!target.isPoint) continue;
-        lower.variance[t] += nugget_;
-        const VectorXd point = target.points.row(0).transpose();
-        for (Index i = 0; i < n; ++i) {
-            if (positions_.col(i) != point) continue;
-            c0[i] += nugget_;
-            if (errors_[i] == 0 && (external_.row(i).array() == external.row(0).array()).all())
-                lower.exactDatum[static_cast<std::size_t>(t)] = i;
+        const Index axes = target.isPoint ? targets.points.cols() : targets.cellAxes;
+        for (Index a = 0; a < places.rows() && axes > 0; ++a) {
+            const double weight = target.weights[a];
+            lower.variance[t] += weight * weight * nugget_;
+            const VectorXd cell = target.points.row(a).head(axes).transpose();
+            for (Index i = 0; i < n; ++i) {
+                if (positions_.col(i).head(axes) != cell) continue;
+                c0[i] += weight * nugget_;
+                if (target.isPoint && errors_[i] == 0 &&
+                    (external_.row(i).array() == external.row(0).array()).all())
+                    lower.exactDatum[static_cast<std::size_t>(t)] = i;
+            }
         }
     }
 
@@ -285,7 +319,7 @@ KrigingPrediction KrigingSystem::predict(const KrigingTargets& targets,
                 out.weights.col(datum) = merged.col(row_[i]) * share_[datum];
             }
     }
-    predictPrecisely(targets, options, lower, out);
+    if (moreDigits_) (this->*moreDigits_->predict)(targets, options, lower, out);
     return out;
 }
 

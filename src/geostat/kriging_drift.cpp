@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "geostat/kriging_names.h"
+#include "geostat/more_digits.h"
 #include "variolux/geostat/kriging.h"
 
 namespace vlx {
@@ -29,7 +30,7 @@ DriftEstimate KrigingSystem::drift() const {
     out.covariance = unit.asDiagonal() * out.covariance * unit.asDiagonal() / varianceScale_;
     out.coefficientError = unit.asDiagonal() * out.coefficientError;
     out.varianceError = unit.cwiseAbs2().asDiagonal() * out.varianceError / varianceScale_;
-    estimateDriftPrecisely(out);
+    if (moreDigits_) (this->*moreDigits_->drift)(out);
     return out;
 }
 
@@ -90,7 +91,7 @@ LeaveOneOut KrigingSystem::leaveOneOut() const {
     out.estimateError = out.estimate;
     out.varianceError = out.variance;
     if (!report_.ok()) return out;
-    leaveOneOutPrecisely(merged);
+    if (moreDigits_) (this->*moreDigits_->leaveOneOut)(merged);
     out.digits = merged.digits;
     const RowVectorXd mean = driftColumns() == 0 && problem_.drift.mean.size() > 0
                                  ? problem_.drift.mean

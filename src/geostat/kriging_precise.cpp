@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "geostat/kriging_names.h"
+#include "geostat/more_digits.h"
 #include "geostat/precise_kriging.h"
 #include "variolux/geostat/kriging.h"
 
@@ -13,6 +14,13 @@ struct KrigingSystem::Lazy {
     std::once_flag once;
     std::unique_ptr<PreciseKriging> precise;
 };
+
+const KrigingSystem::MoreDigits& KrigingSystem::moreDigits() {
+    static constexpr MoreDigits table = {&KrigingSystem::prepareMoreDigits, &KrigingSystem::predictPrecisely,
+                                         &KrigingSystem::estimateDriftPrecisely,
+                                         &KrigingSystem::leaveOneOutPrecisely};
+    return table;
+}
 
 bool KrigingSystem::mayUseMoreDigits() const {
     const Index n = errors_.size();

@@ -355,12 +355,16 @@ class System {
                 out.variance += (a == b ? 1 : 2) * weights[a] * weights[b] *
                                 covariance(places[a], gamma[a], places[b], gamma[b]);
         }
-        if (!point || !field) return out;
+        const Index axes = point ? targets.points.cols() : targets.cellAxes;
         const Real nugget = data_.problem.model.nugget;
-        out.variance += nugget;
-        for (Index i = 0; i < n_; ++i)
-            if (data_.problem.positions.row(first_[at(i)]) == targets.points.row(t))
-                out.covariance[at(i)] += nugget;
+        for (Index a = first; a < last && axes > 0 && field; ++a) {
+            const Real& weight = weights[at(a - first)];
+            out.variance += weight * weight * nugget;
+            const RowVectorXd cell = targets.points.row(a).head(axes);
+            for (Index i = 0; i < n_; ++i)
+                if (data_.problem.positions.row(first_[at(i)]).head(axes) == cell)
+                    out.covariance[at(i)] += weight * nugget;
+        }
         return out;
     }
 

@@ -34,7 +34,7 @@ RandomDrift fitRandomDrift(const DriftMoments& moments, const std::vector<int>& 
     RandomDrift drift;
     drift.precision.assign(static_cast<std::size_t>(groups), moments.start);
     drift.coefficients.setZero(p, moments.right.cols());
-    drift.covariance.setZero(p, p);
+    drift.variance.setZero(p);
     const double least = kLeastPrecision * moments.start, most = kMostPrecision * moments.start;
     for (int iteration = 0;; ++iteration) {
         DriftMatrix matrix = moments.normal;
@@ -47,27 +47,24 @@ RandomDrift fitRandomDrift(const DriftMoments& moments, const std::vector<int>& 
         }
         const DriftMatrix inverse = inverseOf(factor.matrixLLT());
         drift.coefficients = inverse.transpose().lazyProduct(inverse.lazyProduct(moments.right).eval());
-        const DriftVector variance = inverse.colwise().squaredNorm().transpose();
+        drift.variance = inverse.colwise().squaredNorm().transpose();
 
         std::vector<double> explained(static_cast<std::size_t>(groups)), squares = explained;
         for (Eigen::Index j = 0; j < p; ++j) {
             const auto g = static_cast<std::size_t>(group[static_cast<std::size_t>(j)]);
-            explained[g] += std::max(0.0, 1 - drift.precision[g] * variance[j]);
+            explained[g] += std::max(0.0, 1 - drift.precision[g] * drift.variance[j]);
             squares[g] += drift.coefficients.row(j).head(moments.fitted).squaredNorm() / moments.fitted;
         }
         drift.effective = 0;
         for (const double gamma : explained) drift.effective += gamma;
-        if (iteration == iterations) {
-            drift.covariance = inverse.transpose().lazyProduct(inverse);
-            break;
-        }
+        if (iteration == iterations) break;
         for (std::size_t g = 0; g < explained.size(); ++g)
             drift.precision[g] = std::clamp(explained[g] / std::max(squares[g], 1e-300), least, most);
     }
-    if (!drift.coefficients.allFinite() || !drift.covariance.allFinite()) {
+    if (!drift.coefficients.allFinite() || !drift.variance.allFinite()) {
         drift.ok = false;
         drift.coefficients.setZero();
-        drift.covariance.setZero();
+        drift.variance.setZero();
     }
     return drift;
 }

@@ -2,7 +2,6 @@
 //   bare LLT      Eigen's Cholesky of a ready covariance matrix: no filling, no drift, no target
 //   double        KrigingSystem: positions in; filling, factorisation, one target's estimate and variance out
 //   float         the same with a float factor and refinement
-//   batched       krigeBatch, a thousand systems at a time
 //   pivoted LU    the bordered matrix of the textbook, by Eigen's full-pivot LU
 // and what more digits cost where double precision has lost too many. Prints tables for testdata/results. All
 // columns are measured in turns in one run; times are the fastest of many.
@@ -19,7 +18,6 @@
 #include <random>
 
 #include "variolux/geostat/kriging.h"
-#include "variolux/geostat/kriging_batch.h"
 
 namespace {
 
@@ -87,19 +85,17 @@ class Timer {
 
 void timeTable(const char* title, const VariogramModel& model) {
     std::printf("\n%s: microseconds a system (ratio to bare LLT)\n", title);
-    std::printf("%5s %10s %18s %18s %18s %18s\n", "n", "bare LLT", "double", "float", "batched",
-                "pivoted LU");
+    std::printf("%5s %10s %18s %18s %18s\n", "n", "bare LLT", "double", "float", "pivoted LU");
     std::mt19937_64 engine(1);
     const KrigingTargets targets = makeTargets();
     for (const Index n : {16, 32, 64, 128, 256}) {
         const int systems = static_cast<int>(std::max<Index>(16, 1024 / n * 8));
         std::vector<KrigingProblem> problems;
         for (int k = 0; k < systems; ++k) problems.push_back(makeProblem(n, engine, model, 0.05));
-        const std::vector<KrigingTargets> allTargets(problems.size(), targets);
         const MatrixXd k = covarianceMatrix(problems[0]);
         std::vector<KrigingProblem> single = problems;
         for (KrigingProblem& p : single) p.precision = KrigingPrecision::Single;
-        Timer llt, solver, solverSingle, batched, lu;
+        Timer llt, solver, solverSingle, lu;
         const int repeats = static_cast<int>(std::max<Index>(2, 2000000 / (n * n * n)));
         for (int round = 0; round < 15; ++round) {
             llt.round([&] { sink += Eigen::LLT<MatrixXd>(k).matrixLLT()(n - 1, n - 1); }, repeats);
@@ -109,8 +105,6 @@ void timeTable(const char* title, const VariogramModel& model) {
                          repeats);
             solverSingle.round([&] { sink += KrigingSystem(single[next()]).predict(targets).estimate(0, 0); },
                                repeats);
-            batched.round([&] { sink += krigeBatch(problems, allTargets)[0].prediction.estimate(0, 0); },
-                          std::max(1, repeats / systems));
             if (round < 4) lu.round([&] { sink += bordered(k, problems[0], targets)[0]; }, 2);
         }
         const double base = llt.best() * 1e6;
@@ -123,7 +117,6 @@ void timeTable(const char* title, const VariogramModel& model) {
         std::printf("%5ld %10.2f", static_cast<long>(n), base);
         cell(solver.best());
         cell(solverSingle.best());
-        cell(batched.best() / systems);
         cell(lu.best());
         std::printf("\n");
     }
@@ -161,13 +154,12 @@ void errorTable() {
     std::printf(
         "\nerror of the estimate | of the variance (sill 1), worst of 5 systems of 40 data, smooth values, "
         "Gaussian model\n");
-    std::printf("%12s %12s %23s %23s %23s %23s\n", "error var.", "condition", "double", "float", "batched",
-                "pivoted LU");
+    std::printf("%12s %12s %23s %23s %23s\n", "error var.", "condition", "double", "float", "pivoted LU");
     std::mt19937_64 engine(2);
     const KrigingTargets targets = makeTargets();
     for (int digits = 2; digits <= 16; digits += 2) {
         double condition = 0;
-        Eigen::Vector2d worst[4];
+        Eigen::Vector2d worst[3];
         for (Eigen::Vector2d& w : worst) w.setZero();
         for (int k = 0; k < 5; ++k) {
             KrigingProblem p =
@@ -186,8 +178,7 @@ void errorTable() {
                 worst[solver] = worst[solver].cwiseMax((answer - wanted).cwiseAbs());
             };
             note(0, KrigingSystem(p).predict(targets));
-            note(2, krigeBatch({p}, {targets})[0].prediction);
-            worst[3] = worst[3].cwiseMax((bordered(matrix, p, targets) - wanted).cwiseAbs());
+            worst[2] = worst[2].cwiseMax((bordered(matrix, p, targets) - wanted).cwiseAbs());
             p.precision = KrigingPrecision::Single;
             note(1, KrigingSystem(p).predict(targets));
         }

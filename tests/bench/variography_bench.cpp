@@ -3,7 +3,6 @@
 #include <random>
 
 #include "variolux/geostat/empirical_variogram.h"
-#include "variolux/geostat/reml.h"
 #include "variolux/geostat/variogram_fit.h"
 
 namespace {
@@ -60,14 +59,6 @@ BENCHMARK(fitVariogram)
     ->Args({static_cast<int>(vlx::FitSearch::Fast), 1})
     ->Args({static_cast<int>(vlx::FitSearch::Global), 0})
     ->Args({static_cast<int>(vlx::FitSearch::Global), 1});
-
-void fitReml(benchmark::State& state) {
-    const Region region(static_cast<int>(state.range(0)));
-    const vlx::RemlData data{region.positions, region.values, MatrixXd::Ones(region.positions.rows(), 1),
-                             region.noise / 3};
-    for (auto _ : state) benchmark::DoNotOptimize(vlx::fitReml(data).logLikelihood);
-}
-BENCHMARK(fitReml)->Arg(6)->Arg(10)->Unit(benchmark::kMillisecond);
 
 /// One evaluation; arguments: structure type, shape in tenths.
 void semivariance(benchmark::State& state) {

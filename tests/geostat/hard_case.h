@@ -31,10 +31,7 @@ struct HardCase {
 /// Throws std::exception on a file that is not a hard case.
 HardCase readHardCase(const std::string& path);
 
-/// The library's ways to an answer.
-enum class Solver { Double, Single, Batched };
-
-/// Everything that is wrong with the answer to this case; empty = passed.
-std::vector<std::string> checkHardCase(const HardCase& hardCase, Solver solver);
+/// Everything that is wrong with the answer to this case, factorised as told; empty = passed.
+std::vector<std::string> checkHardCase(const HardCase& hardCase, KrigingPrecision precision);
 
 }  // namespace vlx::testing

@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "hard_case.h"
-#include "variolux/geostat/kriging_batch.h"
 
 namespace vlx::testing {
 namespace {
@@ -23,8 +22,8 @@ struct Answer {
 
 class Checker {
   public:
-    Checker(const HardCase& hardCase, Solver solver) : case_(hardCase), solver_(solver) {
-        if (solver == Solver::Single) case_.problem.precision = KrigingPrecision::Single;
+    Checker(const HardCase& hardCase, KrigingPrecision precision) : case_(hardCase) {
+        case_.problem.precision = precision;
     }
 
     std::vector<std::string> run() {
@@ -62,13 +61,7 @@ class Checker {
         const KrigingSystem system(problem);
         KrigingPredictOptions options;
         options.weights = true;
-        Answer answer{system.report(), system.predict(targets, options)};
-        if (solver_ == Solver::Batched) {  // has no weights: the others' serve to set tolerances
-            KrigingBatchAnswer batched = krigeBatch({problem}, {targets}).front();
-            batched.prediction.weights = answer.prediction.weights;
-            answer = {batched.report, batched.prediction};
-        }
-        return answer;
+        return {system.report(), system.predict(targets, options)};
     }
 
     void expect(bool condition, const std::string& failure) {
@@ -349,14 +342,13 @@ class Checker {
     }
 
     HardCase case_;
-    Solver solver_;
     std::vector<std::string> failures_;
 };
 
 }  // namespace
 
-std::vector<std::string> checkHardCase(const HardCase& hardCase, Solver solver) {
-    return Checker(hardCase, solver).run();
+std::vector<std::string> checkHardCase(const HardCase& hardCase, KrigingPrecision precision) {
+    return Checker(hardCase, precision).run();
 }
 
 }  // namespace vlx::testing

@@ -12,10 +12,8 @@ namespace {
 
 using vlx::testing::HardCase;
 
-const std::pair<vlx::testing::Solver, std::string> kSolvers[] = {
-    {vlx::testing::Solver::Double, ""},
-    {vlx::testing::Solver::Single, "single precision: "},
-    {vlx::testing::Solver::Batched, "batched: "}};
+const std::pair<vlx::KrigingPrecision, std::string> kPrecisions[] = {
+    {vlx::KrigingPrecision::Double, ""}, {vlx::KrigingPrecision::Single, "single precision: "}};
 
 struct Pair {
     const char* first;
@@ -74,8 +72,8 @@ int main(int argc, char** argv) {
         try {
             const HardCase hardCase = vlx::testing::readHardCase(path.string());
             std::vector<std::string> failures;
-            for (const auto& [solver, name] : kSolvers)
-                for (const std::string& failure : vlx::testing::checkHardCase(hardCase, solver))
+            for (const auto& [precision, name] : kPrecisions)
+                for (const std::string& failure : vlx::testing::checkHardCase(hardCase, precision))
                     failures.push_back(name + failure);
             report(hardCase.id, failures);
             cases[prefix(hardCase.id)] = hardCase;

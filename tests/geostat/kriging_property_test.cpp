@@ -7,7 +7,6 @@
 
 #include "random_problem.h"
 #include "variolux/geostat/kriging.h"
-#include "variolux/geostat/kriging_batch.h"
 
 namespace vlx {
 namespace {
@@ -384,48 +383,44 @@ TEST(KrigingProperty, SinglePrecisionEqualsDouble) {
     EXPECT_GT(single, kSystems / 2);
 }
 
-TEST(KrigingProperty, BatchesEqualSingleSystemsHoweverTheyAreGrouped) {
-    Random random(13);
-    std::vector<RandomProblem> all;
-    std::vector<KrigingProblem> problems;
-    std::vector<KrigingTargets> targets;
-    RandomProblemOptions options;
-    options.mostData = 130;
-    options.targets = 3;
-    for (int k = 0; k < kSystems; ++k) {
-        all.push_back(randomProblem(random, options));
-        // Targets in general position: a datum that is reproduced exactly leaves the vector path.
-        if (random.chance(0.8)) all.back().targets.points.array() += 1e-3;
-        problems.push_back(all.back().problem);
-        targets.push_back(all.back().targets);
+/// What the cells of a block have of their own is known where each has an exact datum: their mean is it.
+TEST(KrigingProperty, BlocksOfCellsShareTheNuggetOfTheirData) {
+    KrigingProblem problem;
+    problem.model = {.nugget = 0.5, .structures = {{StructureType::Exponential, 1, 2, 1}}};
+    problem.positions.resize(6, 3);  // a place, and a feature that is no place
+    problem.positions << 0, 0, 0.1, 1, 0, 0.2, 0, 1, 0.3, 1, 1, 0.1, 3, 0, 0, 3, 1, 0.4;
+    problem.values.resize(6, 1);
+    problem.values << 2, 3, 5, 7, -11, 13;
+    KrigingTargets block;
+    block.points = problem.positions.topRows(4);
+    block.begin = {0, 4};
+    for (const double tolerance : {1e-9, 0.0}) {  // 0: solved with more digits too
+        problem.accuracy.tolerance = tolerance;
+        const KrigingSystem system(problem);
+        block.cellAxes = 0;
+        const KrigingPrediction smooth = system.predict(block);
+        EXPECT_GT(std::abs(smooth.estimate(0, 0) - 4.25), 0.01);
+        EXPECT_GT(smooth.variance[0], 0.05);
+        block.cellAxes = 2;
+        const KrigingPrediction cells = system.predict(block);
+        EXPECT_NEAR(cells.estimate(0, 0), 4.25, 1e-12);
+        EXPECT_NEAR(cells.variance[0], 0, 1e-12);
+        EXPECT_EQ(cells.moreDigits, tolerance > 0 ? 0 : 1);
+        // A cell without a datum has a nugget that nobody knows.
+        KrigingTargets wide = block;
+        wide.points.conservativeResize(5, 3);
+        wide.points.row(4) << 0.5, 0.25, 0.2;
+        wide.begin = {0, 5};
+        const double without = 0.5 / 25;
+        wide.cellAxes = 2;
+        EXPECT_GT(system.predict(wide).variance[0], without);
+        // The feature is no place: the same cells, unlike in it, share the nugget still.
+        wide = block;
+        wide.points.col(2).setConstant(0.15);
+        EXPECT_LT(system.predict(wide).variance[0], smooth.variance[0]);
     }
-    const std::vector<KrigingBatchAnswer> together = krigeBatch(problems, targets);
-    int batched = 0;
-    for (std::size_t k = 0; k < all.size() && !HasFailure(); ++k) {
-        SCOPED_TRACE("system " + std::to_string(k));
-        const KrigingSystem system(problems[k]);
-        ASSERT_EQ(together[k].report.ok(), system.report().ok());
-        batched += together[k].batched ? 1 : 0;
-        if (system.report().conditionEstimate < kWellConditioned)
-            expectSame(all[k], predict(problems[k], targets[k]), together[k].prediction, 1, 0, 1);
-    }
-    EXPECT_GT(batched, kSystems / 5);
-    // The same bits alone, in reverse order, and with fewer lanes.
-    const auto expectIdentical = [](const KrigingBatchAnswer& a, const KrigingBatchAnswer& b) {
-        EXPECT_EQ(a.batched, b.batched);
-        EXPECT_EQ(a.prediction.status, b.prediction.status);
-        EXPECT_TRUE((a.prediction.estimate.array() == b.prediction.estimate.array()).all());
-        EXPECT_TRUE((a.prediction.variance.array() == b.prediction.variance.array()).all());
-    };
-    std::vector<KrigingProblem> reversedProblems(problems.rbegin(), problems.rend());
-    std::vector<KrigingTargets> reversedTargets(targets.rbegin(), targets.rend());
-    for (const int lanes : {0, 4, 2}) {
-        const auto reversed = krigeBatch(reversedProblems, reversedTargets, {.lanes = lanes});
-        for (std::size_t k = 0; k < all.size() && !HasFailure(); ++k)
-            expectIdentical(together[k], reversed[all.size() - 1 - k]);
-    }
-    for (std::size_t k = 0; k < all.size() && !HasFailure(); k += 7)
-        expectIdentical(together[k], krigeBatch({problems[k]}, {targets[k]}).front());
+    block.cellAxes = 4;
+    EXPECT_EQ(KrigingSystem(problem).predict(block).status[0], TargetStatus::InvalidTarget);
 }
 
 /// Simulates fields with the model's covariance, adds errors of the stated variances, kriges them, and

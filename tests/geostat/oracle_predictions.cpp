@@ -4,13 +4,13 @@
 #include <iostream>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <tuple>
 
 #include "csv.h"
 #include "oracle.h"
 #include "variolux/geostat/kriging.h"
-#include "variolux/geostat/neighbourhood.h"
 
 namespace {
 
@@ -164,15 +164,41 @@ std::pair<MatrixXd, VectorXd> footprint(Block block) {
     return {offsets, weights};
 }
 
+/// Each point from the `count` data nearest to it.
+KrigingPrediction predictFromNearest(const KrigingProblem& problem, const KrigingTargets& targets,
+                                     Index count) {
+    KrigingPrediction all;
+    all.estimate.resize(targets.count(), problem.values.cols());
+    all.variance.resize(targets.count());
+    for (Index t = 0; t < targets.count(); ++t) {
+        const VectorXd distance =
+            (problem.positions.rowwise() - targets.points.row(t)).rowwise().squaredNorm();
+        std::vector<Index> chosen(static_cast<std::size_t>(distance.size()));
+        std::iota(chosen.begin(), chosen.end(), Index{0});
+        std::stable_sort(chosen.begin(), chosen.end(),
+                         [&](Index a, Index b) { return distance[a] < distance[b]; });
+        chosen.resize(std::min(chosen.size(), static_cast<std::size_t>(count)));
+        KrigingProblem local = problem;
+        local.positions = problem.positions(chosen, Eigen::all);
+        local.values = problem.values(chosen, Eigen::all);
+        if (problem.errorVariances.size() > 0) local.errorVariances = problem.errorVariances(chosen);
+        KrigingTargets point;
+        point.points = targets.points.row(t);
+        const KrigingPrediction one = KrigingSystem(local).predict(point);
+        all.estimate.row(t) = one.estimate.row(0);
+        all.variance[t] = one.variance[0];
+        all.status.push_back(one.status[0]);
+    }
+    return all;
+}
+
 KrigingPrediction predict(const Dataset& set, const Method& method, const KrigingProblem& problem) {
     KrigingTargets targets;
     targets.points = Dataset::positions(set.targets);
     const MatrixXd external = method.base == "KED" ? MatrixXd(set.external(set.targets)) : MatrixXd();
     targets.externalDrift = external;
     if (method.nearest > 0) {
-        NeighbourhoodOptions options;
-        options.most = method.nearest;
-        return predictLocally(problem, targets, options).prediction;
+        return predictFromNearest(problem, targets, method.nearest);
     }
     if (method.block != Block::None) {
         const auto [offsets, weights] = footprint(method.block);

@@ -4,8 +4,6 @@
 
 #include "exact_kriging.h"
 #include "random_problem.h"
-#include "variolux/geostat/kriging_batch.h"
-#include "variolux/geostat/neighbourhood.h"
 
 namespace vlx {
 namespace {
@@ -154,9 +152,6 @@ TEST(PreciseKriging, HardSystemsEqualTheTextbookIn400Digits) {
             }
         };
         check(p);
-        check(krigeBatch({hard.problem}, {hard.targets})[0].prediction);
-        if (hard.targets.begin.empty())
-            check(predictLocally(hard.problem, hard.targets, {.most = 100}).prediction);
         KrigingProblem single = hard.problem;
         single.precision = KrigingPrecision::Single;
         check(KrigingSystem(single).predict(hard.targets));
@@ -305,7 +300,6 @@ TEST(PreciseKriging, AnInvalidSystemAnswersInTheUsualShapes) {
     const DriftEstimate drift = system.drift();
     EXPECT_TRUE(drift.coefficients.rows() == 3 && drift.coefficients.cols() == 2);
     EXPECT_TRUE(drift.coefficients.array().isNaN().all() && drift.covariance.array().isNaN().all());
-    EXPECT_TRUE(krigeBatch({hard.problem}, {hard.targets})[0].prediction.estimate.array().isNaN().all());
     CovarianceProblem broken;
     broken.covariance = -MatrixXd::Identity(2, 2);
     broken.drift = MatrixXd::Ones(2, 1);
@@ -331,7 +325,6 @@ TEST(PreciseKriging, ADatumOfInfiniteErrorVarianceIsIgnoredWhateverItsNumbers) {
     EXPECT_EQ((found.estimate - wanted.estimate).cwiseAbs().maxCoeff(), 0);
     EXPECT_EQ((found.variance - wanted.variance).cwiseAbs().maxCoeff(), 0);
     EXPECT_EQ(system.leaveOneOut().status[4], TargetStatus::InvalidTarget);
-    EXPECT_EQ(krigeBatch({problem}, {hard.targets})[0].prediction.estimate(0, 0), wanted.estimate(0, 0));
     problem.errorVariances[4] = 1;
     EXPECT_FALSE(KrigingSystem(problem).report().ok());
 }

@@ -80,7 +80,7 @@ TEST(RandomDrift, PriorVariancesAreTheFixedPointOfTheEvidence) {
     const RandomDrift drift = fitRandomDrift(made(60, slopes).moments(), {0, 1}, 2, 200);
     for (Eigen::Index j = 0; j < 2; ++j) {
         const double a = drift.precision[static_cast<std::size_t>(j)];
-        const double gamma = 1 - a * drift.covariance(j, j);
+        const double gamma = 1 - a * drift.variance[j];
         EXPECT_NEAR(a, gamma / (drift.coefficients.row(j).squaredNorm() / 3), 1e-6 * a);
     }
 }
@@ -95,7 +95,7 @@ TEST(RandomDrift, WhatExplainsNothingDropsOutAndWhatExplainsMuchStays) {
     EXPECT_LT(drift.coefficients.bottomRows(5).cwiseAbs().maxCoeff(), 0.08);
 }
 
-TEST(RandomDrift, CovarianceCoversTheCoefficients) {
+TEST(RandomDrift, VarianceCoversTheCoefficients) {
     // 400 replications with slopes drawn from the prior: z scores of N(0, 1) lie within 1 in 68 %.
     std::mt19937 random(3);
     std::normal_distribution<double> normal;
@@ -110,8 +110,7 @@ TEST(RandomDrift, CovarianceCoversTheCoefficients) {
         const RandomDrift drift = fitRandomDrift(data.moments(), {0, 0, 0, 0}, 1, 30);
         for (Eigen::Index j = 0; j < 4; ++j)
             for (Eigen::Index c = 0; c < 3; ++c) {
-                within +=
-                    std::abs(drift.coefficients(j, c) - slopes(j, c)) < std::sqrt(drift.covariance(j, j));
+                within += std::abs(drift.coefficients(j, c) - slopes(j, c)) < std::sqrt(drift.variance[j]);
                 ++count;
             }
     }

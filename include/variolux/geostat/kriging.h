@@ -18,7 +18,8 @@
 /// diagonal).
 ///
 /// Nugget or error? The *nugget* belongs to the field: two data at one place share it, a target that is
-/// bitwise at a datum sees it (so that error-free data are reproduced exactly), block averages do not. An
+/// bitwise at a datum sees it (so that error-free data are reproduced exactly), block averages do not, but
+/// those of cells (KrigingTargets::cellAxes). An
 /// *error variance* belongs to one datum: it is on the diagonal only, twins at one place have independent
 /// errors, and the prediction is of Z, without error. Monte Carlo noise is an error variance.
 ///
@@ -83,6 +84,10 @@ struct KrigingTargets {
     /// points [begin[t], begin[t + 1]), as a weighted mean. A block of one point is Z there without its
     /// nugget.
     std::vector<Eigen::Index> begin;
+    /// Of the nugget of a block's points, each at a place of its own: 0: none. Otherwise they stand for cells
+    /// with a nugget each, shared by the data whose first `cellAxes` coordinates are bitwise theirs (the
+    /// others may be features).
+    Eigen::Index cellAxes = 0;
     Eigen::VectorXd weights;        ///< k, of each point in its block (normalised here); empty = equal
     Eigen::MatrixXd externalDrift;  ///< m x q: the external functions at the target (averaged over its block)
 
@@ -120,7 +125,12 @@ struct KrigingPredictOptions {
 /// Immutable; safe to share between threads.
 class KrigingSystem {
   public:
-    explicit KrigingSystem(const KrigingProblem& problem);
+    explicit KrigingSystem(const KrigingProblem& problem) : KrigingSystem(problem, &moreDigits()) {}
+
+    /// In double precision only, as with accuracy.mostDigits = 0. A program that makes all its systems so
+    /// does not link the arithmetic with more digits, whose tables take it some tenths of a second at each
+    /// start.
+    static KrigingSystem inDouble(const KrigingProblem& problem) { return KrigingSystem(problem, nullptr); }
 
     const KrigingReport& report() const { return report_; }
 
@@ -141,6 +151,9 @@ class KrigingSystem {
 
   private:
     struct Block;
+    struct MoreDigits;
+    KrigingSystem(const KrigingProblem& problem, const MoreDigits* moreDigits);
+    static const MoreDigits& moreDigits();
     bool validate();
     void chooseScales();
     bool ignored(Eigen::Index datum) const;
@@ -189,6 +202,7 @@ class KrigingSystem {
 
     CovarianceSystem system_;
 
+    const MoreDigits* moreDigits_;  // null: none
     struct Lazy;
     std::shared_ptr<Lazy> lazy_;  // the system with more digits, once it has been needed
     /// Where double precision finds drift columns dependent: the drift alone, by least squares, to say

@@ -39,15 +39,15 @@ struct RandomDrift {
     /// p x c: E[b | z].
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxRandomDrift, kMaxRandomDrift>
         coefficients;
-    DriftMatrix covariance;         ///< p x p: Cov[b | z]
+    DriftVector variance;           ///< p: Var[b_j | z]
     std::vector<double> precision;  ///< a_g of each group
-    double effective = 0;           ///< effective number of functions, sum_j (1 - a_j Cov_jj)
+    double effective = 0;           ///< effective number of functions, sum_j (1 - a_j Var[b_j | z])
     bool ok = true;                 ///< false: the equations are not finite; coefficients are then 0
 };
 
 /// Estimates the prior variances by maximum likelihood of type II and solves. MacKay's fixed point (1992,
-/// Bayesian interpolation), `iterations` times: gamma_g = sum (1 - a_g Cov_jj), a_g = gamma_g / mean over
-/// value columns of sum b_j^2. `group[j]` in [0, groups) is the group of function j. Never throws.
+/// Bayesian interpolation), `iterations` times: gamma_g = sum (1 - a_g Var[b_j | z]), a_g = gamma_g / mean
+/// over value columns of sum b_j^2. `group[j]` in [0, groups) is the group of function j. Never throws.
 RandomDrift fitRandomDrift(const DriftMoments& moments, const std::vector<int>& group, int groups,
                            int iterations);
 

@@ -54,7 +54,8 @@ void setVariogram(RegionInspection& inspection, const EmpiricalVariogram& variog
                   const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours,
                   const Eigen::VectorXd& errorVariances);
 
-/// Leave-one-out of a kriging system whose first three value columns are `colours` (n x 3).
-CrossValidation crossValidate(const CovarianceSystem& system, const Eigen::MatrixXd& colours);
+/// From a kriging system's leave-one-out of data whose first three value columns are `colours` (n x 3); what
+/// is not a number is left out.
+CrossValidation crossValidate(const LeaveOneOut& left, const Eigen::MatrixXd& colours);
 
 }  // namespace vlx

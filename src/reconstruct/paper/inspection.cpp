@@ -16,10 +16,8 @@ void setVariogram(RegionInspection& inspection, const EmpiricalVariogram& variog
         inspection.cloud.push_back({cloud[i].distance, cloud[i].semivariance});
 }
 
-CrossValidation crossValidate(const CovarianceSystem& system, const Eigen::MatrixXd& colours) {
+CrossValidation crossValidate(const LeaveOneOut& left, const Eigen::MatrixXd& colours) {
     CrossValidation result;
-    if (!system.report().ok()) return result;
-    const LeaveOneOut left = system.leaveOneOut();
     double squares = 0;
     for (Eigen::Index i = 0; i < left.estimate.rows() && i < colours.rows(); ++i) {
         const double square = (left.estimate.row(i).head(3) - colours.row(i)).squaredNorm();

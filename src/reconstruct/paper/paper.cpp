@@ -8,8 +8,8 @@
 #include "reconstruct/common/picture_scale.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
-#include "variolux/geostat/covariance_system.h"
 #include "variolux/geostat/empirical_variogram.h"
+#include "variolux/geostat/kriging.h"
 #include "variolux/geostat/variogram_fit.h"
 
 namespace vlx {
@@ -92,55 +92,36 @@ Eigen::MatrixXd composite(const Eigen::MatrixXd& positions, const Eigen::MatrixX
     return joined;
 }
 
-/// The kriging system and its targets: each pixel is the mean of its cells, at their centres, with the
-/// pixel's colour. The nugget is variation between cells, which a cell of the pixel shares with its datum.
-struct System {
-    CovarianceProblem problem;
-    CovarianceTargets targets;
-};
+KrigingProblem problemOf(const RegionData& data, const VariogramModel& model, const Moments& moments,
+                         const Eigen::MatrixXd& differences, double k) {
+    KrigingProblem problem;
+    problem.model = model;
+    problem.positions = composite(data.positions, differences, k);
+    problem.values = data.means;
+    problem.errorVariances = moments.errors;
+    return problem;
+}
 
-System assemble(const RegionData& data, const VariogramModel& model, const Moments& moments,
-                const Eigen::MatrixXd& differences, const Eigen::MatrixXd& pixelColours, double k) {
-    const VariogramModel smooth{.nugget = 0, .structures = model.structures};
-    const Eigen::Index n = data.size();
+/// Each pixel is the mean of its cells, at their centres, with the pixel's colour. The nugget is variation
+/// between cells, which a cell of the pixel shares with its datum.
+KrigingTargets pixelTargets(const RegionData& data, const Eigen::MatrixXd& pixelColours, double k) {
     const auto pixels = static_cast<Eigen::Index>(data.pixels.pixels());
     const int cells = data.cellsPerPixel, perPixel = cells * cells;
-
-    System system;
-    const Eigen::MatrixXd places = composite(data.positions, differences, k).transpose();
-    Eigen::MatrixXd& covariances = system.problem.covariance;
-    covariances.resize(n, n);
-    for (Eigen::Index j = 0; j < n; ++j) {
-        for (Eigen::Index i = j + 1; i < n; ++i)
-            covariances(i, j) = covariance(smooth, (places.col(i) - places.col(j)).norm());
-        covariances(j, j) = model.sill() + moments.errors[j];
-    }
-    system.problem.drift = Eigen::MatrixXd::Ones(n, 1);
-    system.problem.values = data.means;
-
-    // Between two cells of one pixel only their distance matters: the same mean for every pixel.
-    double within = model.nugget / perPixel;
-    for (int a = 0; a < perPixel; ++a)
-        for (int b = 0; b < perPixel; ++b)
-            within += covariance(smooth, std::hypot(a % cells - b % cells, a / cells - b / cells) / cells) /
-                      (perPixel * perPixel);
-    system.targets.variance = Eigen::VectorXd::Constant(pixels, within);
-    system.targets.drift = Eigen::MatrixXd::Ones(pixels, 1);
-    system.targets.covariance = Eigen::MatrixXd::Zero(n, pixels);
+    Eigen::MatrixXd positions(pixels * perPixel, 2), colours(pixels * perPixel, kColours);
+    KrigingTargets targets;
+    targets.cellAxes = 2;
     for (Eigen::Index p = 0; p < pixels; ++p) {
+        targets.begin.push_back(p * perPixel);
         const double left = data.pixels.x + static_cast<double>(p % data.pixels.width);
         const double top = data.pixels.y + static_cast<double>(p / data.pixels.width);
-        for (Eigen::Index i = 0; i < n; ++i) {
-            const double colour = k * (differences.row(i) - pixelColours.row(p)).norm();
-            const double x = data.positions(i, 0) - left, y = data.positions(i, 1) - top;
-            double sum = x > 0 && x < 1 && y > 0 && y < 1 ? model.nugget : 0;
-            for (int cell = 0; cell < perPixel; ++cell)
-                sum += covariance(smooth, std::hypot(x - (cell % cells + 0.5) / cells,
-                                                     y - (cell / cells + 0.5) / cells, colour));
-            system.targets.covariance(i, p) = sum / perPixel;
-        }
+        for (int cell = 0; cell < perPixel; ++cell)
+            positions.row(p * perPixel + cell) << left + (cell % cells + 0.5) / cells,
+                top + (cell / cells + 0.5) / cells;
+        colours.middleRows(p * perPixel, perPixel).rowwise() = pixelColours.row(p);
     }
-    return system;
+    targets.begin.push_back(pixels * perPixel);
+    targets.points = composite(positions, colours, k);
+    return targets;
 }
 
 /// Section 4: the empirical variogram of the cell means, less their noise, in classes up to the region's
@@ -327,13 +308,15 @@ RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, 
     diagnostics.range = fit.model.structures.front().range;
     diagnostics.exponent = fit.model.structures.front().shape;
 
-    System assembled = assemble(data, fit.model, moments, differences, firstEstimates(data, moments), k);
-    const CovarianceSystem system(std::move(assembled.problem));
+    // More digits would take some thousand times as long: a pixel may be Inaccurate, and is counted.
+    const KrigingSystem system = KrigingSystem::inDouble(problemOf(data, fit.model, moments, differences, k));
     diagnostics.condition = system.report().conditionEstimate;
     diagnostics.jitter = system.report().jitter;
-    const KrigingPrediction prediction = system.predict(assembled.targets, {.weights = true});
+    const KrigingPrediction prediction =
+        system.predict(pixelTargets(data, firstEstimates(data, moments), k), {.weights = true});
     if (inspect) {
-        estimate.inspection.crossValidation = crossValidate(system, data.means.leftCols(kColours));
+        estimate.inspection.crossValidation =
+            crossValidate(system.leaveOneOut(), data.means.leftCols(kColours));
         if (!system.report().message.empty())
             estimate.inspection.fallbacks.push_back(system.report().message);
     }
