@@ -1,7 +1,13 @@
 #include "variolux/base/image_io.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfMultiPartInputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+#include <ImfThreading.h>
+#include <half.h>
 #include <openexr.h>
 
 #include <array>
@@ -12,19 +18,15 @@
 #include <memory>
 #include <type_traits>
 
+#include "base/image_library.h"
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
 #include "variolux/base/output_file.h"
+#include "variolux/base/parallel.h"
 
 namespace vlx {
 
 namespace {
-
-std::string oiioError(const std::string& own) {
-    std::string text = own.empty() ? OIIO::geterror() : own;
-    while (!text.empty() && text.back() == '\n') text.pop_back();
-    return text.empty() ? "unknown reason" : text;
-}
 
 /// Throws Error when an image is larger than this program takes, or than the file can hold: a small file
 /// holds no huge image, whatever its header says. zlib makes at most 1032 bytes of one, of an area of one
@@ -41,14 +43,17 @@ void checkSize(const std::string& path, int width, int height, int channels, boo
         throw Error(path, "expected at most 2^31 values, found " + found);
 }
 
+bool isExr(const std::string& path) {
+    std::array<unsigned char, 4> start{};
+    std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(start.data()), start.size());
+    return start == std::array<unsigned char, 4>{0x76, 0x2f, 0x31, 0x01};
+}
+
 /// Checks the sizes of the flat parts of an OpenEXR file by its headers alone: libraries take memory for the
 /// tables that headers claim, or say no more than that the file ends. Returns what is wrong with the headers
 /// themselves, or nothing, as of files of other formats.
 std::string checkExrHeaders(const std::string& path) {
-    std::array<unsigned char, 4> start{};
-    std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(start.data()), start.size());
-    if (start != std::array<unsigned char, 4>{0x76, 0x2f, 0x31, 0x01}) return {};
-
+    if (!isExr(path)) return {};
     std::string fault;
     exr_context_initializer_t how = EXR_DEFAULT_CONTEXT_INITIALIZER;
     how.user_data = &fault;
@@ -88,104 +93,177 @@ Image readImage(const std::string& path) {
     if (!std::filesystem::is_regular_file(path, status))
         throw Error(path, "expected an image, found no such file");
     const std::string fault = checkExrHeaders(path);
-    const auto input = OIIO::ImageInput::open(path);
-    if (!input) {
-        const std::string said = oiioError({});
-        throw Error(path, "expected an image: " + (fault.empty() ? said : fault));
-    }
+    std::string said;
+    const auto input = imageLibrary().open(path, said);
+    if (!input) throw Error(path, "expected an image: " + (fault.empty() ? said : fault));
     int part = 0;
-    while (input->spec().deep)
-        if (!input->seek_subimage(++part, 0))
-            throw Error(path, "expected a flat image, found only deep samples");
+    while (input->info().deep)
+        if (!input->seek(++part)) throw Error(path, "expected a flat image, found only deep samples");
 
-    const OIIO::ImageSpec spec = input->spec();
-    if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 || spec.depth > 1)
+    const ImageInfo info = input->info();
+    const Window& data = info.data;
+    const auto channels = static_cast<int>(info.channels.size());
+    if (data.width <= 0 || data.height <= 0 || channels <= 0 || info.depth > 1)
         throw Error(path, "expected a flat image with pixels and channels, found " +
-                              std::to_string(spec.width) + " x " + std::to_string(spec.height) + " x " +
-                              std::to_string(spec.depth) + ", " + std::to_string(spec.nchannels) +
-                              " channels");
-    const bool exr = std::string_view(input->format_name()) == "openexr";
-    const bool lossy = !exr || std::string(spec.get_string_attribute("compression")).starts_with("dwa");
-    checkSize(path, spec.width, spec.height, spec.nchannels, lossy);
-    requireMemory(path, imageBytes(Window{0, 0, spec.width, spec.height}, spec.channelnames.size()),
-                  "an image held whole");
+                              std::to_string(data.width) + " x " + std::to_string(data.height) + " x " +
+                              std::to_string(info.depth) + ", " + std::to_string(channels) + " channels");
+    const bool lossy = info.format != "openexr" || info.text("compression").starts_with("dwa");
+    checkSize(path, data.width, data.height, channels, lossy);
+    requireMemory(path, imageBytes(data, info.channels.size()), "an image held whole");
 
-    Image image(Window{spec.x, spec.y, spec.width, spec.height}, spec.channelnames);
-    image.display = Window{spec.full_x, spec.full_y, spec.full_width, spec.full_height};
-    if (!input->read_image(part, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.pixels.data()))
-        throw Error(
-            path, "expected " + std::to_string(spec.height) + " whole rows: " + oiioError(input->geterror()));
+    Image image(data, info.channels);
+    image.display = info.display;
+    if (!input->readAll(part, image.pixels.data()))
+        throw Error(path, "expected " + std::to_string(data.height) + " whole rows: " + input->error());
     return image;
 }
 
-struct ImageWriter::Impl {
-    OutputFile file;
-    std::unique_ptr<OIIO::ImageOutput> output;
-    OIIO::ImageSpec spec;
-    bool exr = false;
-    // OpenEXR notices a full disk. The libraries behind other formats do not: libpng's output is cut short
-    // without a word, libjpeg ends the program. They write to memory, and the bytes are written here.
-    OIIO::Filesystem::IOVecOutput memory = {};
-    int nextRow = 0;
+namespace {
 
-    [[noreturn]] void fail() const {
-        throw Error(file.path(), "writing failed: " + oiioError(output->geterror()));
+/// Of one file. Throws Error.
+struct RowWriter {
+    OutputFile file;
+    Window data;
+    int nextRow;
+
+    RowWriter(const std::string& path, const Window& window) : file(path), data(window), nextRow(window.y) {}
+    virtual ~RowWriter() = default;
+    virtual void write(const float* rows, int count) = 0;
+    virtual void finish() = 0;
+    [[noreturn]] void fail(const std::string& why) const {
+        throw Error(file.path(), "writing failed: " + why);
     }
+};
+
+Imf::Compression compressionOf(const std::string& path, const std::string& name) {
+    static const std::map<std::string, Imf::Compression> known = {
+        {"none", Imf::NO_COMPRESSION},  {"rle", Imf::RLE_COMPRESSION},   {"zips", Imf::ZIPS_COMPRESSION},
+        {"zip", Imf::ZIP_COMPRESSION},  {"piz", Imf::PIZ_COMPRESSION},   {"pxr24", Imf::PXR24_COMPRESSION},
+        {"b44", Imf::B44_COMPRESSION},  {"b44a", Imf::B44A_COMPRESSION}, {"dwaa", Imf::DWAA_COMPRESSION},
+        {"dwab", Imf::DWAB_COMPRESSION}};
+    const auto found = known.find(name);
+    if (found == known.end()) throw Error(path, "expected a compression of OpenEXR, found '" + name + "'");
+    return found->second;
+}
+
+struct ExrWriter : RowWriter {
+    std::vector<std::string> channels;
+    bool half;
+    std::vector<::half> halves;
+    std::unique_ptr<Imf::OutputFile> output;
+
+    ExrWriter(const std::string& path, const Window& window, const Window& display,
+              const std::vector<std::string>& names, const ImageWriteOptions& options)
+        : RowWriter(path, window), channels(names), half(options.half) {
+        const auto box = [](const Window& w) {
+            return Imath::Box2i({w.x, w.y}, {w.x + w.width - 1, w.y + w.height - 1});
+        };
+        Imf::Header header(box(display), box(window));
+        header.compression() = compressionOf(path, options.compression);
+        for (const std::string& name : names)
+            header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
+        for (const auto& [name, value] : options.attributes) header.insert(name, Imf::StringAttribute(value));
+        if (Imf::globalThreadCount() < threadCount()) Imf::setGlobalThreadCount(threadCount());
+        attempt([&] { output = std::make_unique<Imf::OutputFile>(file.temporaryPath().c_str(), header); });
+    }
+
+    template <class F>
+    void attempt(F f) {
+        try {
+            f();
+        } catch (const Error&) {
+            throw;
+        } catch (const std::exception& error) {
+            fail(error.what());
+        }
+    }
+
+    void write(const float* rows, int count) override {
+        const std::size_t each = half ? sizeof(::half) : sizeof(float);
+        const std::size_t stride = each * channels.size(),
+                          row = stride * static_cast<std::size_t>(data.width);
+        auto* values = reinterpret_cast<char*>(const_cast<float*>(rows));
+        if (half) {
+            halves.assign(rows, rows + row / each * static_cast<std::size_t>(count));
+            values = reinterpret_cast<char*>(halves.data());
+        }
+        Imf::FrameBuffer buffer;
+        for (std::size_t c = 0; c < channels.size(); ++c)
+            buffer.insert(channels[c],
+                          Imf::Slice::Make(half ? Imf::HALF : Imf::FLOAT, values + c * each,
+                                           Imath::V2i(data.x, nextRow), data.width, count, stride, row));
+        attempt([&] {
+            output->setFrameBuffer(buffer);
+            output->writePixels(count);
+        });
+    }
+
+    void finish() override {
+        attempt([&] { output.reset(); });
+    }
+};
+
+/// Other formats, by OpenImageIO. The libraries behind them do not notice a full disk: libpng's output is cut
+/// short without a word, libjpeg ends the program. They write to memory, and the bytes are written here.
+struct OtherWriter : RowWriter {
+    std::unique_ptr<ImageOutput> output;
+
+    OtherWriter(const std::string& path, const Window& window, const Window& display,
+                const std::vector<std::string>& names, const ImageWriteOptions& options)
+        : RowWriter(path, window) {
+        std::string fault;
+        output = imageLibrary().create(file.temporaryPath(), fault);
+        if (!output) throw Error(path, "expected an image format that can be written: " + fault);
+        if (!output->toMemory())
+            throw Error(path, "expected an image format that can be written, found " + output->format());
+        if (!output->open(file.temporaryPath(), {window, display, names, options.half, options.attributes}))
+            fail(output->error());
+    }
+    void write(const float* rows, int count) override {
+        if (!output->write(nextRow, nextRow + count, rows)) fail(output->error());
+    }
+    void finish() override {
+        if (!output->close()) fail(output->error());
+        std::ofstream bytes(file.temporaryPath(), std::ios::binary);
+        bytes.write(reinterpret_cast<const char*>(output->memory().data()),
+                    static_cast<std::streamsize>(output->memory().size()));
+        bytes.close();
+        if (!bytes) throw Error(file.path(), "writing to disk failed");
+    }
+};
+
+}  // namespace
+
+struct ImageWriter::Impl {
+    std::unique_ptr<RowWriter> rows;
 };
 
 ImageWriter::ImageWriter(const std::string& path, const Window& data, const Window& display,
                          const std::vector<std::string>& channels, const ImageWriteOptions& options)
-    : impl_(new Impl{OutputFile(path), {}, {}}) {
-    auto& output = impl_->output = OIIO::ImageOutput::create(impl_->file.temporaryPath());
-    if (!output) throw Error(path, "expected an image format that can be written: " + oiioError({}));
-
-    OIIO::ImageSpec& spec = impl_->spec;
-    spec = OIIO::ImageSpec(data.width, data.height, static_cast<int>(channels.size()), OIIO::TypeDesc::FLOAT);
-    if (std::string_view(output->format_name()) == "png") spec.format = OIIO::TypeDesc::UINT8;
-    if (options.half) spec.format = OIIO::TypeDesc::HALF;
-    spec.x = data.x;
-    spec.y = data.y;
-    spec.full_x = display.x;
-    spec.full_y = display.y;
-    spec.full_width = display.width;
-    spec.full_height = display.height;
-    spec.channelnames = channels;
-    impl_->exr = std::string_view(output->format_name()) == "openexr";
-    if (impl_->exr) spec.attribute("compression", options.compression);
-    // Pixels arrive as they must be stored: no library-side colour conversion of 8-bit formats.
-    spec.attribute("oiio:ColorSpace", spec.format == OIIO::TypeDesc::UINT8 ? "sRGB" : "Linear");
-    for (const auto& [name, value] : options.attributes) spec.attribute(name, value);
-
-    if (!impl_->exr && !output->set_ioproxy(&impl_->memory))
-        throw Error(path, std::string("expected an image format that can be written, found ") +
-                              output->format_name());
-    if (!output->open(impl_->file.temporaryPath(), spec)) impl_->fail();
-    impl_->nextRow = data.y;
+    : impl_(new Impl) {
+    std::string extension = std::filesystem::path(path).extension().string();
+    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (extension == ".exr")
+        impl_->rows = std::make_unique<ExrWriter>(path, data, display, channels, options);
+    else
+        impl_->rows = std::make_unique<OtherWriter>(path, data, display, channels, options);
 }
 
 ImageWriter::~ImageWriter() = default;
 
 void ImageWriter::write(const float* rows, int count) {
-    if (!impl_->output->write_scanlines(impl_->nextRow, impl_->nextRow + count, 0, OIIO::TypeDesc::FLOAT,
-                                        rows))
-        impl_->fail();
-    impl_->nextRow += count;
+    impl_->rows->write(rows, count);
+    impl_->rows->nextRow += count;
 }
 
 void ImageWriter::close() {
-    const int end = impl_->spec.y + impl_->spec.height;
-    if (impl_->nextRow != end)
-        throw Error(impl_->file.path(), "expected rows up to " + std::to_string(end) + ", found them up to " +
-                                            std::to_string(impl_->nextRow));
-    if (!impl_->output->close()) impl_->fail();
-    if (!impl_->exr) {
-        std::ofstream bytes(impl_->file.temporaryPath(), std::ios::binary);
-        bytes.write(reinterpret_cast<const char*>(impl_->memory.buffer().data()),
-                    static_cast<std::streamsize>(impl_->memory.buffer().size()));
-        bytes.close();
-        if (!bytes) throw Error(impl_->file.path(), "writing to disk failed");
-    }
-    impl_->file.commit();
+    RowWriter& writer = *impl_->rows;
+    const int end = writer.data.y + writer.data.height;
+    if (writer.nextRow != end)
+        throw Error(writer.file.path(), "expected rows up to " + std::to_string(end) + ", found them up to " +
+                                            std::to_string(writer.nextRow));
+    writer.finish();
+    writer.file.commit();
 }
 
 void writeImage(const std::string& path, const Image& image, const ImageWriteOptions& options) {
@@ -197,12 +275,18 @@ void writeImage(const std::string& path, const Image& image, const ImageWriteOpt
 std::string readTextAttribute(const std::string& path, const std::string& name) {
     std::error_code ignored;
     if (!std::filesystem::is_regular_file(path, ignored)) return {};
-    const auto input = OIIO::ImageInput::open(path);
-    if (!input) {
-        OIIO::geterror();  // which is no news: it is not to be found by the next one who asks
-        return {};
+    if (isExr(path)) {
+        try {
+            const Imf::MultiPartInputFile file(path.c_str(), 0, false);
+            const auto* found = file.header(0).findTypedAttribute<Imf::StringAttribute>(name);
+            return found != nullptr ? found->value() : std::string();
+        } catch (const std::exception&) {  // not whole
+            return {};
+        }
     }
-    return std::string(input->spec().get_string_attribute(name));
+    std::string fault;
+    const auto input = imageLibrary().open(path, fault);
+    return input ? input->info().text(name) : std::string();
 }
 
 float linearToSrgb(float linear) {

@@ -1,12 +1,11 @@
 #include "exr/flat_images.h"
 
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <bit>
 #include <filesystem>
 #include <limits>
 
+#include "base/image_library.h"
 #include "exr/flat_header.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
@@ -23,37 +22,28 @@ constexpr int kMaxBandRows = 32;
 // Values of a row of one image, or of a row of its tiles.
 constexpr std::int64_t kMaxStripValues = std::int64_t{1} << 28;
 
-std::string reason(std::string own) {
-    if (own.empty()) own = OIIO::geterror();
-    while (!own.empty() && own.back() == '\n') own.pop_back();
-    return own.empty() ? "unknown reason" : own;
+void checkRowLength(const std::string& path, const ImageInfo& info) {
+    const std::int64_t rows = std::max(info.tileHeight, 1);
+    const auto channels = static_cast<std::int64_t>(info.channels.size());
+    if (info.data.width * channels * rows > kMaxStripValues)
+        throw Error(path, "expected rows of at most 2^28 values, found " + std::to_string(info.data.width) +
+                              " pixels of " + std::to_string(channels) + " channels");
 }
 
-void checkRowLength(const std::string& path, const OIIO::ImageSpec& spec) {
-    const std::int64_t rows = std::max(spec.tile_height, 1);
-    if (std::int64_t{spec.width} * spec.nchannels * rows > kMaxStripValues)
-        throw Error(path, "expected rows of at most 2^28 values, found " + std::to_string(spec.width) +
-                              " pixels of " + std::to_string(spec.nchannels) + " channels");
-}
-
-std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
+std::unique_ptr<ImageInput> open(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status))
         throw Error(path, "expected an image, found no such file");
     checkFlatHeader(path);
-    auto input = OIIO::ImageInput::open(path);
-    if (!input) throw Error(path, "expected an image: " + reason({}));
-    const OIIO::ImageSpec& spec = input->spec();
-    if (spec.deep) throw Error(path, "expected a flat image, found deep samples: this is a dump already");
-    if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 || spec.depth > 1)
+    std::string fault;
+    auto input = imageLibrary().open(path, fault);
+    if (!input) throw Error(path, "expected an image: " + fault);
+    const ImageInfo info = input->info();
+    if (info.deep) throw Error(path, "expected a flat image, found deep samples: this is a dump already");
+    if (info.data.width <= 0 || info.data.height <= 0 || info.channels.empty() || info.depth > 1)
         throw Error(path, "expected a flat image with pixels and channels, found none");
-    checkRowLength(path, spec);
+    checkRowLength(path, info);
     return input;
-}
-
-Window dataWindow(const OIIO::ImageSpec& spec) { return {spec.x, spec.y, spec.width, spec.height}; }
-Window displayWindow(const OIIO::ImageSpec& spec) {
-    return {spec.full_x, spec.full_y, spec.full_width, spec.full_height};
 }
 
 }  // namespace
@@ -76,9 +66,9 @@ std::string partChannel(int part, const std::string& partName, const std::string
 // What is taken from one part of an image, in rows of interleaved values.
 class FlatPart {
   public:
-    FlatPart(int number, const OIIO::ImageSpec& spec) : number_(number), spec_(spec) {}
+    FlatPart(int number, const ImageInfo& info) : number_(number), info_(info) {}
 
-    const OIIO::ImageSpec& spec() const { return spec_; }
+    const ImageInfo& info() const { return info_; }
 
     void take(int channel) {
         begin_ = std::min(begin_, channel);
@@ -86,12 +76,11 @@ class FlatPart {
     }
 
     // Returns whether all went well.
-    bool read(OIIO::ImageInput& input, int y, int rows) {
+    bool read(ImageInput& input, int y, int rows) {
         if (begin_ >= end_) return true;
         values_.resize(rowValues() * static_cast<std::size_t>(rows));
-        return spec_.tile_width > 0 ? readTiles(input, y, rows)
-                                    : input.read_scanlines(number_, 0, y, y + rows, 0, begin_, end_,
-                                                           OIIO::TypeDesc::FLOAT, values_.data());
+        return info_.tileWidth > 0 ? readTiles(input, y, rows)
+                                   : input.readRows(number_, y, y + rows, begin_, end_, values_.data());
     }
 
     const std::vector<float>& values() const { return values_; }
@@ -103,20 +92,18 @@ class FlatPart {
 
   private:
     std::size_t rowValues() const {
-        return static_cast<std::size_t>(spec_.width) * static_cast<std::size_t>(end_ - begin_);
+        return static_cast<std::size_t>(info_.data.width) * static_cast<std::size_t>(end_ - begin_);
     }
 
     // Tiles come in whole rows of tiles; the one read last is kept for the next band.
-    bool readTiles(OIIO::ImageInput& input, int y, int rows) {
+    bool readTiles(ImageInput& input, int y, int rows) {
         for (int row = y; row < y + rows; ++row) {
-            const int first = row - (row - spec_.y) % spec_.tile_height;
-            const int last = std::min(first + spec_.tile_height, spec_.y + spec_.height);
+            const int first = row - (row - info_.data.y) % info_.tileHeight;
+            const int last = std::min(first + info_.tileHeight, info_.data.y + info_.data.height);
             if (first != stripBegin_) {
                 strip_.resize(rowValues() * static_cast<std::size_t>(last - first));
                 stripBegin_ = std::numeric_limits<int>::min();
-                if (!input.read_tiles(number_, 0, spec_.x, spec_.x + spec_.width, first, last, 0, 1, begin_,
-                                      end_, OIIO::TypeDesc::FLOAT, strip_.data()))
-                    return false;
+                if (!input.readTileRows(number_, first, last, begin_, end_, strip_.data())) return false;
                 stripBegin_ = first;
             }
             std::copy_n(strip_.begin() + static_cast<std::ptrdiff_t>(rowValues()) * (row - first),
@@ -126,7 +113,7 @@ class FlatPart {
     }
 
     int number_;
-    OIIO::ImageSpec spec_;
+    ImageInfo info_;
     int begin_ = std::numeric_limits<int>::max();
     int end_ = 0;
     std::vector<float> values_;
@@ -138,24 +125,21 @@ class FlatImages::Source {
   public:
     Source(std::string path, bool keepOpen) : path_(std::move(path)), keepOpen_(keepOpen) {
         auto input = vlx::open(path_);
-        for (int number = 0; input->seek_subimage(number, 0); ++number) {
-            const OIIO::ImageSpec spec = input->spec();
-            if (number > 0 && (spec.deep || dataWindow(spec) != dataWindow(parts_.front().spec()) ||
-                               spec.nchannels <= 0 || spec.depth > 1))
+        for (int number = 0; input->seek(number); ++number) {
+            const ImageInfo info = input->info();
+            if (number > 0 && (info.deep || info.data != parts_.front().info().data ||
+                               info.channels.empty() || info.depth > 1))
                 continue;
-            if (number > 0) checkRowLength(path_, spec);
-            const std::string name(spec.get_string_attribute("oiio:subimagename"));
-            for (int channel = 0; channel < spec.nchannels; ++channel) {
-                std::string known =
-                    partChannel(number, name, spec.channelnames[static_cast<std::size_t>(channel)]);
+            if (number > 0) checkRowLength(path_, info);
+            for (std::size_t channel = 0; channel < info.channels.size(); ++channel) {
+                std::string known = partChannel(number, info.part, info.channels[channel]);
                 if (contains(names_, known)) continue;
                 names_.push_back(std::move(known));
-                places_.push_back({parts_.size(), channel});
+                places_.push_back({parts_.size(), static_cast<int>(channel)});
             }
-            parts_.emplace_back(number, spec);
+            parts_.emplace_back(number, info);
         }
-        static_cast<void>(input->geterror());  // there is no further part: not an error
-        input->seek_subimage(0, 0);
+        input->seek(0);
         if (keepOpen_) input_ = std::move(input);
     }
 
@@ -174,7 +158,7 @@ class FlatImages::Source {
         for (FlatPart& part : parts_) {
             if (!part.read(*input, y, rows))
                 throw Error(path_, "rows " + std::to_string(y) + " to " + std::to_string(y + rows - 1) +
-                                       ": " + reason(input->geterror()));
+                                       ": " + input->error());
             for (const float value : part.values())
                 hash_ = (hash_ ^ std::bit_cast<std::uint32_t>(value)) * 1099511628211u;
         }
@@ -185,10 +169,10 @@ class FlatImages::Source {
         return parts_[taken_[index].part].value(pixel, taken_[index].channel);
     }
     const std::string& path() const { return path_; }
-    const OIIO::ImageSpec& spec() const { return parts_.front().spec(); }
+    const ImageInfo& info() const { return parts_.front().info(); }
     const std::vector<std::string>& names() const { return names_; }
-    Window data() const { return dataWindow(spec()); }
-    Window display() const { return displayWindow(spec()); }
+    Window data() const { return info().data; }
+    Window display() const { return info().display; }
     std::uint64_t hash() const { return hash_; }
 
   private:
@@ -199,7 +183,7 @@ class FlatImages::Source {
 
     std::string path_;
     bool keepOpen_;
-    std::unique_ptr<OIIO::ImageInput> input_;
+    std::unique_ptr<ImageInput> input_;
     std::vector<FlatPart> parts_;
     std::vector<std::string> names_;
     std::vector<Place> places_;  // of each name
@@ -230,15 +214,11 @@ Window FlatImages::data() const { return sources_.front()->data(); }
 Window FlatImages::display() const { return sources_.front()->display(); }
 
 std::string FlatImages::text(std::size_t image, const std::string& attribute) const {
-    return std::string(sources_[image]->spec().get_string_attribute(attribute));
+    return sources_[image]->info().text(attribute);
 }
 
 std::optional<double> FlatImages::number(std::size_t image, const std::string& attribute) const {
-    const OIIO::ParamValue* found = sources_[image]->spec().find_attribute(attribute);
-    if (found == nullptr || found->type().aggregate != OIIO::TypeDesc::SCALAR ||
-        found->type().basetype == OIIO::TypeDesc::STRING)
-        return std::nullopt;
-    return found->get_float();
+    return sources_[image]->info().number(attribute);
 }
 
 FlatChannel FlatImages::take(std::size_t image, const std::string& channel) {

@@ -1,9 +1,7 @@
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
-
 #include <cmath>
 #include <limits>
 
+#include "base/image_library.h"
 #include "render/gltf/gltf_file.h"
 #include "render/scene/scene_loader.h"
 #include "variolux/base/error.h"
@@ -41,14 +39,6 @@ std::vector<T> toRgba(const std::vector<T>& in, int channels, T one) {
     return out;
 }
 
-template <class T>
-std::vector<T> readPixels(OIIO::ImageInput& in, const OIIO::ImageSpec& spec) {
-    std::vector<T> pixels(static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height) *
-                          static_cast<std::size_t>(spec.nchannels));
-    if (!in.read_image(0, 0, 0, spec.nchannels, OIIO::BaseTypeFromC<T>::value, pixels.data())) pixels.clear();
-    return pixels;
-}
-
 }  // namespace
 
 Texture GltfFile::image(int index, ColourSpace space) const {
@@ -64,26 +54,25 @@ Texture GltfFile::image(int index, ColourSpace space) const {
     const std::string format = formatOf(bytes);
     if (format.empty()) fail(what + " is neither PNG nor JPEG nor WebP");
 
-    OIIO::Filesystem::IOMemReader memory(const_cast<unsigned char*>(bytes.data()), bytes.size());
-    OIIO::ImageSpec config;
-    config["oiio:UnassociatedAlpha"] = 1;
-    OIIO::Filesystem::IOProxy* proxy = &memory;
-    config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
-    const auto in = OIIO::ImageInput::open("memory" + format, &config);
-    if (!in) fail(what + " cannot be decoded: " + OIIO::geterror());
-    const OIIO::ImageSpec spec = in->spec();
-    if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 ||
-        std::int64_t{spec.width} * spec.height > kMostPixels)
-        fail(what + " has the size " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
+    std::string fault;
+    const auto in = imageLibrary().open(bytes, format, fault);
+    if (!in) fail(what + " cannot be decoded: " + fault);
+    const ImageInfo info = in->info();
+    const int width = info.data.width, height = info.data.height;
+    if (width <= 0 || height <= 0 || info.channels.empty() || std::int64_t{width} * height > kMostPixels)
+        fail(what + " has the size " + std::to_string(width) + "x" + std::to_string(height) +
              ", expected 1 to 2^28 pixels");
-    if (spec.format.basesize() == 1) {
-        const auto pixels = readPixels<std::uint8_t>(*in, spec);
-        if (pixels.empty()) fail(what + " cannot be decoded: " + in->geterror());
-        return {spec.width, spec.height, toRgba<std::uint8_t>(pixels, spec.nchannels, 255), space};
+    const std::size_t values =
+        static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * info.channels.size();
+    const auto channels = static_cast<int>(info.channels.size());
+    if (info.bytes) {
+        std::vector<std::uint8_t> pixels(values);
+        if (!in->readAll(pixels.data())) fail(what + " cannot be decoded: " + in->error());
+        return {width, height, toRgba<std::uint8_t>(pixels, channels, 255), space};
     }
-    const auto pixels = readPixels<float>(*in, spec);
-    if (pixels.empty()) fail(what + " cannot be decoded: " + in->geterror());
-    return {spec.width, spec.height, toRgba(pixels, spec.nchannels, 1.f), space};
+    std::vector<float> pixels(values);
+    if (!in->readAll(0, pixels.data())) fail(what + " cannot be decoded: " + in->error());
+    return {width, height, toRgba(pixels, channels, 1.f), space};
 }
 
 Environment loadEnvironment(const std::string& path) {
