@@ -20,29 +20,14 @@
 #include <cstring>
 #include <set>
 
+#include "dump/exr_attributes.h"
 #include "exr/header_walker.h"
-#include "exr/little_endian.h"
 #include "variolux/base/error.h"
-#include "variolux/base/image_io.h"
 #include "variolux/dump/splats.h"
 
 namespace vlx {
 
 namespace {
-
-constexpr char kVersion[] = "variolux:version";
-constexpr char kRenderer[] = "variolux:renderer";
-constexpr char kScene[] = "variolux:scene";
-constexpr char kSeed[] = "variolux:seed";
-constexpr char kSamples[] = "variolux:samples";
-constexpr char kPixelFilter[] = "variolux:pixelFilter";
-constexpr char kEffects[] = "variolux:effects";
-constexpr char kSplatReplicates[] = "variolux:splatReplicates";
-constexpr char kReplicatesShare[] = "variolux:replicatesShare";
-constexpr char kRenderSeconds[] = "variolux:renderSeconds";
-constexpr char kMaxSamples[] = "maxSamplesPerPixel";
-constexpr char kWorldToCamera[] = "worldToCamera";
-constexpr char kWorldToNDC[] = "worldToNDC";
 
 class MemoryInput : public Imf::IStream {
   public:
@@ -59,23 +44,6 @@ class MemoryInput : public Imf::IStream {
 
   private:
     const Bytes& bytes_;
-    std::size_t at_ = 0;
-};
-
-class MemoryOutput : public Imf::OStream {
-  public:
-    explicit MemoryOutput(Bytes& bytes) : Imf::OStream("header"), bytes_(bytes) {}
-    void write(const char from[], int count) override {
-        const auto end = at_ + static_cast<std::size_t>(count);
-        if (end > bytes_.size()) bytes_.resize(end);
-        std::memcpy(bytes_.data() + at_, from, static_cast<std::size_t>(count));
-        at_ = end;
-    }
-    std::uint64_t tellp() override { return at_; }
-    void seekp(std::uint64_t to) override { at_ = to; }
-
-  private:
-    Bytes& bytes_;
     std::size_t at_ = 0;
 };
 
@@ -112,10 +80,6 @@ Window toWindow(const std::string& path, const char* what, const Imath::Box2i& b
     return {box.min.x, box.min.y, static_cast<int>(width), static_cast<int>(height)};
 }
 
-Imath::Box2i toBox(const Window& window) {
-    return {{window.x, window.y}, {window.x + (window.width - 1), window.y + (window.height - 1)}};
-}
-
 DumpCompression toCompression(const std::string& path, Imf::Compression compression) {
     switch (compression) {
         case Imf::NO_COMPRESSION:
@@ -128,28 +92,6 @@ DumpCompression toCompression(const std::string& path, Imf::Compression compress
             throw Error(path,
                         "expected compression none, RLE or ZIPS (deep files have no other), found type " +
                             std::to_string(static_cast<int>(compression)));
-    }
-}
-
-Imf::Compression fromCompression(DumpCompression compression) {
-    switch (compression) {
-        case DumpCompression::None:
-            return Imf::NO_COMPRESSION;
-        case DumpCompression::Rle:
-            return Imf::RLE_COMPRESSION;
-        default:
-            return Imf::ZIPS_COMPRESSION;
-    }
-}
-
-Imf::PixelType fromType(ChannelType type) {
-    switch (type) {
-        case ChannelType::Half:
-            return Imf::HALF;
-        case ChannelType::Uint:
-            return Imf::UINT;
-        default:
-            return Imf::FLOAT;
     }
 }
 
@@ -205,35 +147,6 @@ std::vector<std::string> split(const std::string& text) {
         begin = end + 1;
     }
     return parts;
-}
-
-std::string joined(const std::vector<std::string>& parts) {
-    std::string text;
-    for (const auto& part : parts) text += (text.empty() ? "" : ",") + part;
-    return text;
-}
-
-// Attributes that a DumpHeader has members for, or that OpenEXR gives a meaning of its own.
-bool isReserved(const std::string& name) {
-    static const std::set<std::string> names = {"channels",
-                                                "chunkCount",
-                                                "compression",
-                                                "dataWindow",
-                                                "deepImageState",
-                                                "displayWindow",
-                                                "lineOrder",
-                                                kMaxSamples,
-                                                "name",
-                                                "pixelAspectRatio",
-                                                "screenWindowCenter",
-                                                "screenWindowWidth",
-                                                "tiles",
-                                                "type",
-                                                "version",
-                                                "view",
-                                                kWorldToCamera,
-                                                kWorldToNDC};
-    return (name.starts_with("variolux:") && name != kInputsAttribute) || names.contains(name);
 }
 
 DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
@@ -406,103 +319,6 @@ std::optional<FileHeader> decodeHeader(const std::string& path, const Bytes& sta
         }
     for (const auto& channel : header.dump.channels) header.bytesPerSample += valueBytes(channel.type);
     return header;
-}
-
-std::vector<std::string> beautyChannels(const DumpHeader& dump) {
-    std::vector<std::string> names;
-    for (const char* name : {"A", "B", "G", "R", "Z"})
-        if (findChannel(dump, name) >= 0) names.emplace_back(name);
-    return names;
-}
-
-EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
-    EncodedHeader encoded;
-    try {
-        Imf::Header common(toBox(dump.display), toBox(dump.data));
-        common.compression() = fromCompression(dump.compression);
-        common.lineOrder() = Imf::INCREASING_Y;
-        common.setChunkCount(dump.data.height);
-        if (dump.worldToCamera) {
-            Imath::M44f m;
-            std::copy_n(dump.worldToCamera->begin(), 16, &m.x[0][0]);
-            Imf::addWorldToCamera(common, m);
-        }
-        if (dump.worldToNDC) {
-            Imath::M44f m;
-            std::copy_n(dump.worldToNDC->begin(), 16, &m.x[0][0]);
-            Imf::addWorldToNDC(common, m);
-        }
-        for (const auto& [name, text] : dump.extra) {
-            if (isReserved(name))
-                throw Error(path, "attribute '" + name + "' may not be set as an extra one");
-            common.insert(name, Imf::StringAttribute(text));
-        }
-
-        Imf::Header beauty = common;
-        beauty.setName("beauty");
-        beauty.setType(Imf::SCANLINEIMAGE);
-        for (const auto& name : beautyChannels(dump))
-            beauty.channels().insert(name, Imf::Channel(Imf::FLOAT));
-
-        Imf::Header samples = common;
-        samples.setName("samples");
-        samples.setType(Imf::DEEPSCANLINE);
-        samples.setVersion(1);
-        for (const auto& channel : dump.channels)
-            samples.channels().insert(channel.name, Imf::Channel(fromType(channel.type)));
-        Imf::addDeepImageState(samples, Imf::DIS_MESSY);
-        samples.insert(kMaxSamples, Imf::IntAttribute(0));
-        samples.insert(kVersion, Imf::IntAttribute(dump.version));
-        const auto text = [&](const char* name, const std::string& content) {
-            if (!content.empty()) samples.insert(name, Imf::StringAttribute(content));
-        };
-        text(kRenderer, dump.renderer);
-        text(kScene, dump.scene);
-        text(kPixelFilter, dump.pixelFilter);
-        text(kEffects, joined(dump.effects));
-        if (dump.replicatesShare) samples.insert(kReplicatesShare, Imf::IntAttribute(1));
-        if (dump.seed) text(kSeed, std::to_string(*dump.seed));
-        if (dump.samples) samples.insert(kSamples, Imf::DoubleAttribute(*dump.samples));
-        samples.insert(kRenderSeconds, Imf::DoubleAttribute(dump.renderSeconds.value_or(0)));
-
-        std::vector<Imf::Header*> parts = {&beauty, &samples};
-        Imf::Header splats = common;
-        if (dump.splatReplicates > 0) {
-            splats.setName("splats");
-            splats.setType(Imf::SCANLINEIMAGE);
-            for (const auto& name : splatChannels(dump.splatReplicates))
-                splats.channels().insert(name, Imf::Channel(Imf::FLOAT));
-            splats.insert(kSplatReplicates, Imf::IntAttribute(dump.splatReplicates));
-            parts.push_back(&splats);
-        }
-
-        MemoryOutput out(encoded.bytes);
-        // The flags say: deep data, several parts, and names of up to 255 bytes.
-        const std::array<std::uint32_t, 2> start = {
-            static_cast<std::uint32_t>(Imf::MAGIC),
-            static_cast<std::uint32_t>(Imf::EXR_VERSION | Imf::NON_IMAGE_FLAG | Imf::MULTI_PART_FILE_FLAG |
-                                       Imf::LONG_NAMES_FLAG)};
-        for (const std::uint32_t word : start) append(encoded.bytes, word);
-        out.seekp(encoded.bytes.size());
-        for (Imf::Header* part : parts) {
-            part->sanityCheck(false, true);
-            part->writeTo(out);
-        }
-        encoded.bytes.push_back(0);
-    } catch (const Error&) {
-        throw;
-    } catch (const std::exception& error) {
-        throw Error(path, std::string("this header cannot be written: ") + error.what());
-    }
-
-    HeaderWalker walker(path, encoded.bytes, encoded.bytes.size());
-    walker.word();
-    walker.word();
-    walker.header();
-    const auto samples = walker.header();
-    encoded.renderSeconds = findAttribute(samples, kRenderSeconds)->value;
-    encoded.maxSamplesPerPixel = findAttribute(samples, kMaxSamples)->value;
-    return encoded;
 }
 
 }  // namespace vlx

@@ -32,6 +32,9 @@ struct EncodedHeader {
     std::size_t maxSamplesPerPixel = 0;  ///< a 32-bit integer
 };
 
+/// Throws Error when no dump can have this header: windows, names of channels, what splats and matrices need.
+void checkHeader(const std::string& path, const DumpHeader& header);
+
 /// Header of the file that DumpWriter writes, for the header `dump` with its channels sorted by
 /// name. Throws Error on what cannot be written.
 EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump);

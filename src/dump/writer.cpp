@@ -1,7 +1,6 @@
 #include "variolux/dump/writer.h"
 
 #include <Imath/half.h>
-#include <time.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,9 +11,9 @@
 #include <limits>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <thread>
 
+#include "dump/cpu_timer.h"
 #include "dump/exr_header.h"
 #include "dump/pool.h"
 #include "dump/stored_values.h"
@@ -37,25 +36,6 @@ namespace {
 constexpr std::size_t kQueuedBands = 2;
 
 constexpr std::int64_t kMaxInt = std::numeric_limits<std::int32_t>::max();
-
-std::int64_t threadNanoseconds() {
-    timespec now{};
-    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
-
-// Adds the processor time of its own life to a sum.
-class CpuTimer {
-  public:
-    explicit CpuTimer(std::atomic<std::int64_t>& sum) : sum_(sum) {}
-    ~CpuTimer() { sum_ += threadNanoseconds() - start_; }
-    CpuTimer(const CpuTimer&) = delete;
-    CpuTimer& operator=(const CpuTimer&) = delete;
-
-  private:
-    std::atomic<std::int64_t>& sum_;
-    const std::int64_t start_ = threadNanoseconds();
-};
 
 void appendValues(Bytes& bytes, ChannelType type, const float* values, std::size_t count) {
     bytes.resize(bytes.size() + count * valueBytes(type));
@@ -103,31 +83,6 @@ DumpHeader sortedByName(DumpHeader header) {
     return header;
 }
 
-void validate(const std::string& path, const DumpHeader& header) {
-    for (const Window& window : {header.data, header.display}) {
-        if (!isPossible(window.x, window.y, window.width, window.height))
-            throw Error(path, "expected a window of pixels within 2^30 of 0, found " + windowText(window));
-    }
-    std::set<std::string> names;
-    for (const auto& channel : header.channels) {
-        if (channel.name.empty() || channel.name.size() > 255 || channel.name.find('\0') != std::string::npos)
-            throw Error(path, "expected channel names of 1 to 255 bytes, found '" + channel.name + "'");
-        if (!names.insert(channel.name).second) throw Error(path, "two channels are named " + channel.name);
-    }
-    for (const char* name : {"R", "G", "B"})
-        if (!names.contains(name)) throw Error(path, std::string("a dump needs a channel ") + name);
-    for (const auto* matrix : {&header.worldToCamera, &header.worldToNDC})
-        if (*matrix && (*matrix)->size() != 16) throw Error(path, "expected matrices of 16 values");
-    if (header.splatReplicates < 0 || header.splatReplicates > kMostSplatReplicates)
-        throw Error(path, "expected at most " + std::to_string(kMostSplatReplicates) +
-                              " replicates of splats, found " + std::to_string(header.splatReplicates));
-    if (header.splatReplicates > 1 && !names.contains("sample.replicate"))
-        throw Error(path, "splats of several replicates need a channel sample.replicate");
-    for (const auto& effect : header.effects)
-        if (effect.empty() || effect.find(',') != std::string::npos)
-            throw Error(path, "expected names of effects without commas, found '" + effect + "'");
-}
-
 }  // namespace
 
 struct DumpWriter::Impl {
@@ -135,7 +90,7 @@ struct DumpWriter::Impl {
         : header(dump),
           sorted(sortedByName(dump)),
           nextRow(dump.data.y),
-          file((validate(path, dump), path)),
+          file((checkHeader(path, dump), path)),
           disk(path, file.temporaryPath(), RawFile::Mode::Write) {
         for (const auto& channel : sorted.channels) order.push_back(findChannel(header, channel.name));
         for (const auto& name : beautyChannels(header)) beauty.push_back(findChannel(header, name));

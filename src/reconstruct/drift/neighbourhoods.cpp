@@ -6,6 +6,7 @@
 
 #include "reconstruct/common/wide.h"
 #include "reconstruct/drift/gram.h"
+#include "reconstruct/drift/wild_values.h"
 #include "variolux/geostat/random_drift.h"
 
 namespace vlx {
@@ -27,8 +28,6 @@ constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this man
 // than their prefilter says. Twice the standard deviation.
 constexpr double kFeatureErrorFactor = 4;
 constexpr float kLeastSquare = 1e-30f;  // of radiance, or of its noise
-constexpr double kWildVariances = 9;    // a feature beyond three standard deviations may be wild
-constexpr double kFew = 0.02;           // of the data: as many may be
 constexpr int kPriorIterations = 4;
 
 int lanesUp(int n) { return (n + 7) & ~7; }
@@ -207,7 +206,9 @@ class Tile {
             float* x = constant + (1 + kPositionFunctions + static_cast<int>(varying_.size())) * stride;
             for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - about;
             std::fill(x + n, x + padded, 0.f);
-            if (forgetWild(x, n, padded, total) < kLeastFeatureSpread) continue;
+            if (forgetWild({x, weights_.data(), n, padded, total}, kFarthest * kFeatureWidth2, sorted_) <
+                kLeastFeatureSpread)
+                continue;
             const float* errors = features_.data() + plane(in_.featureCount + f);
             double sum = 0;
             for (int i = 0; i < n; ++i) {
@@ -327,43 +328,6 @@ class Tile {
             scatter(sum, n, sums_.data() + plane(out.sum(c)));
             if (c < 3) scatter(square, n, sums_.data() + plane(out.square(c)));
         }
-    }
-
-    /// Weighted variance of a feature, n values, once wild ones are forgotten: a few values that lie farther
-    /// from the range of all others than it is wide, and than features may differ at all, would fix its
-    /// coefficient by themselves. They count as not known: as the mean of the others.
-    double forgetWild(float* x, int n, int padded, double total) {
-        double sums[2];
-        weightedSums(x, weights_.data(), padded, sums);
-        double mean = sums[0] / total;
-        const double variance = (sums[1] - sums[0] * mean) / total;
-        const float far = farthest(x, weights_.data(), padded, static_cast<float>(mean));
-        if (far <= kFarthest * kFeatureWidth2 || static_cast<double>(far) <= kWildVariances * variance)
-            return variance;
-        sorted_.clear();
-        for (int i = 0; i < n; ++i)
-            if (weights_[static_cast<std::size_t>(i)] > 0) sorted_.push_back(x[i]);
-        const auto few = std::max<std::ptrdiff_t>(
-            2, static_cast<std::ptrdiff_t>(kFew * static_cast<double>(sorted_.size())));
-        if (static_cast<std::ptrdiff_t>(sorted_.size()) <= 2 * few) return variance;
-        std::nth_element(sorted_.begin(), sorted_.begin() + few, sorted_.end());
-        const float low = sorted_[static_cast<std::size_t>(few)];
-        std::nth_element(sorted_.begin(), sorted_.end() - 1 - few, sorted_.end());
-        const float high = *(sorted_.end() - 1 - few);
-        const float margin = std::max(std::sqrt(kFarthest * kFeatureWidth2), high - low);
-        const auto wild = [&](int i) { return x[i] < low - margin || x[i] > high + margin; };
-        double known = 0, sum = 0;
-        for (int i = 0; i < n; ++i)
-            if (!wild(i)) {
-                known += static_cast<double>(weights_[static_cast<std::size_t>(i)]);
-                sum += static_cast<double>(weights_[static_cast<std::size_t>(i)] * x[i]);
-            }
-        if (!(known > 0)) return variance;
-        mean = sum / known;
-        for (int i = 0; i < n; ++i)
-            if (wild(i)) x[i] = static_cast<float>(mean);
-        weightedSums(x, weights_.data(), padded, sums);
-        return (sums[1] - sums[0] * sums[0] / total) / total;
     }
 
     void scatter(const float* values, int n, float* to) const {
