@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Which room may include which: the directions of DESIGN's house, kept.  usage: includes.py PROJECT
+"""Which room may include which, and how large rooms and files may be: the house, kept.  usage: includes.py PROJECT
 
 Rooms are the folders of src and include/variolux; a header of include/variolux/X belongs to room X."""
 import os
@@ -17,6 +17,8 @@ MAY = {  # room: rooms whose headers it may include, besides its own
     'compare': {'base'},
     'render': {'base', 'dump'},
 }
+MOST_LINES = 400   # of a file of src, include or tools
+MOST_SOURCES = 30  # of a folder
 APART = [('reconstruct/paper', 'reconstruct/drift')]  # neither includes the other
 
 include = re.compile(r'^\s*#include "([^"]+)"', re.M)
@@ -53,7 +55,25 @@ def faults(project):
                                 yield f'{path}: {here} includes {header}; they are apart'
 
 
+def sizes(project):
+    for root in ('src', 'include', 'tools'):
+        for folder, _, names in os.walk(os.path.join(project, root)):
+            if '__pycache__' in folder:
+                continue
+            sources = [name for name in names if name.endswith(('.h', '.cpp'))]
+            if len(sources) > MOST_SOURCES:
+                yield f'{folder}: expected at most {MOST_SOURCES} sources, found {len(sources)}'
+            for name in names:
+                with open(os.path.join(folder, name), encoding='utf-8') as file:
+                    text = file.read()
+                lines = text.count('\n')
+                if lines > MOST_LINES:
+                    yield f'{os.path.join(folder, name)}: expected at most {MOST_LINES} lines, found {lines}'
+                if name.endswith(('.h', '.cpp')) and '<OpenImageIO/' in text and name != 'openimageio.cpp':
+                    yield f'{os.path.join(folder, name)}: includes OpenImageIO, which only the module may'
+
+
 if __name__ == '__main__':
-    found = list(faults(sys.argv[1]))
-    print('\n'.join(found) if found else 'all directions kept')
+    found = [*faults(sys.argv[1]), *sizes(sys.argv[1])]
+    print('\n'.join(found) if found else 'the house is kept')
     sys.exit(1 if found else 0)

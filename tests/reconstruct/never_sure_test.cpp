@@ -177,15 +177,14 @@ TEST(NeverSure, ABlackPictureMayHaveMissedLight) {
 
 // What scatters by a thousandth of the picture's level and what does not scatter at all have missed the same.
 TEST(NeverSure, TheErrorMapHasNoBorderInTheDark) {
-    const SampleBuffer dump =
-        picture(96, {"R", "G", "B"}, 5, [](int x, int, Random& random, auto& samples) {
-            std::exponential_distribution<float> light(1);
-            const float level = x < 32 ? 0.5f : x < 64 ? 5e-4f : 0.f;
-            for (int s = 0; s < 8; ++s) {
-                const float z = level * light(random);
-                samples.push_back({z, z / 2, z / 4});
-            }
-        });
+    const SampleBuffer dump = picture(96, {"R", "G", "B"}, 5, [](int x, int, Random& random, auto& samples) {
+        std::exponential_distribution<float> light(1);
+        const float level = x < 32 ? 0.5f : x < 64 ? 5e-4f : 0.f;
+        for (int s = 0; s < 8; ++s) {
+            const float z = level * light(random);
+            samples.push_back({z, z / 2, z / 4});
+        }
+    });
     const Image image = reconstructDriftKriging(dump, {}).image;
     for (int colour = 0; colour < 3; ++colour) {
         const auto column = [&](int x) {
