@@ -31,7 +31,7 @@ std::optional<double> ImageInfo::number(const std::string& name) const {
 const ImageLibrary& imageLibrary() {
     static const ImageLibrary* const library = [] {
         // Found by the program's run path, which linking variolux::base sets. Never closed.
-        constexpr const char* kName = "libvariolux_openimageio.so";
+        constexpr const char* kName = VLX_MODULE_FOLDER "libvariolux_openimageio.so";
         void* const module = dlopen(kName, RTLD_NOW | RTLD_LOCAL);
         void* const entry = module ? dlsym(module, "variolux_image_library") : nullptr;
         if (!entry)
