@@ -1,7 +1,6 @@
 #include <malloc.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <functional>
@@ -16,6 +15,7 @@
 #include "import/bcd.h"
 #include "import/image_layers.h"
 #include "import_options.h"
+#include "krige_options.h"
 #include "progress_bar.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
@@ -34,219 +34,18 @@
 
 namespace {
 
-enum class Method { Krige, Paper, Mean, Gaussian };
-
-struct Options {
-    std::string input;
-    vlx::MomentFlags moments;
-    std::string layersOf;
-    bool dropLayers = false;
-    std::string image;
-    Method method = Method::Krige;
-    vlx::DriftKrigingOptions krige;
-    vlx::PixelFilter filter = vlx::PixelFilter::Box;
-    std::string band;
-    std::string samplingMap;
-    bool noFeatures = false;
-    vlx::PositionConvention positions = vlx::PositionConvention::Raster;
-    bool layersAreSamples = false;
-    double sigma = 1;
-    vlx::PaperOptions paper;
-    bool noColourDistance = false;
-    bool wholeImage = false;
-    bool diagnostics = false;
-    std::vector<std::string> inspect;
-    bool json = false;
-    int threads = 0;
-    std::string maxMemory;
-    std::string frames;
-    bool overwrite = false;
-    const CLI::App* commandLine = nullptr;
-};
-
-void bind(CLI::App& app, Options& o) {
-    o.commandLine = &app;
-    app.add_option(
-           "INPUT", o.input,
-           "Sample dump (deep OpenEXR) of any renderer, or a flat image with the variance of its pixels")
-        ->required();
-    app.add_option(
-           "-o,--output", o.image,
-           "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
-           "deviation of the error of R, G, B). Of a flat OpenEXR image: a copy with all its layers and "
-           "parts, R, G, B, A and named radiance denoised, stddev added")
-        ->required();
-    app.add_option(
-           "--template", o.layersOf,
-           "Put the result into a copy of this flat OpenEXR file of the same size, as of a flat input")
-        ->option_text("IMAGE");
-    app.add_flag("--drop-layers", o.dropLayers, "Of a flat image: write only what is denoised, and stddev")
-        ->excludes("--template");
-    vlx::addChoice(
-        app, "--method", o.method,
-        {{"krige", Method::Krige},
-         {"paper", Method::Paper},
-         {"mean", Method::Mean},
-         {"gaussian", Method::Gaussian}},
-        "krige: kriging with the features as external drift, in overlapping neighbourhoods; paper: "
-        "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples, its stddev the "
-        "plain standard error, 0 where they agree; "
-        "gaussian: the average, Gaussian filtered (no layer stddev)");
-    vlx::addChoice(
-        app, "--quality", o.krige.quality,
-        {{"draft", vlx::Quality::Draft}, {"standard", vlx::Quality::Standard}, {"high", vlx::Quality::High}},
-        "krige: draft: one model, sparse neighbourhoods; standard: three models; high: neighbourhoods "
-        "twice as dense along each axis");
-    vlx::addChoice(
-        app, "--fireflies", o.krige.fireflies,
-        {{"keep", vlx::Fireflies::Keep},
-         {"robust", vlx::Fireflies::Robust},
-         {"clamp", vlx::Fireflies::Clamp}},
-        "krige: samples far brighter than all around. keep: unbiased and noisy; robust: the brightest "
-        "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
-        "What was removed is reported");
-    app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
-        ->check(vlx::finitePositive())
-        ->capture_default_str();
-    app.add_option("--strength", o.krige.strength,
-                   "krige: 0 keeps the plain average (of what --fireflies leaves), 1 takes the estimate")
-        ->check(vlx::finiteWithin(0, 1))
-        ->capture_default_str();
-    app.add_option(
-        "--feature", o.krige.features,
-        "krige: a further channel of the dump to use as drift, besides albedo, N and Z; repeatable");
-    app.add_option(
-        "--radiance", o.krige.radiance,
-        "krige: a further channel or layer to estimate with the same weights as R, G, B (a light group): "
-        "parts still add up; repeatable");
-    app.add_option("--scale", o.krige.scale,
-                   "krige: pixels of the image along each axis for one of the dump; needs sample positions")
-        ->check(CLI::Range(1, 4))
-        ->capture_default_str();
-    vlx::addChoice(
-        app, "--filter", o.filter,
-        {{"box", vlx::PixelFilter::Box},
-         {"gaussian", vlx::PixelFilter::Gaussian},
-         {"blackman-harris", vlx::PixelFilter::BlackmanHarris}},
-        "krige: pixel filter of the result. box: averages over pixels; gaussian: standard deviation "
-        "0.5, radius 1.5; blackman-harris: radius 1.5 pixels");
-    std::vector<std::pair<std::string, vlx::PositionConvention>> conventions;
-    for (const auto& known : vlx::positionConventions())
-        conventions.emplace_back(known.name, known.convention);
-    vlx::addChoice(
-        app, "--positions", o.positions, conventions,
-        "What sample.x and sample.y of the dump are, where they are used (--scale, --filter, paper). "
-        "raster: pixels, downwards; others are recognised and told");
-    app.add_flag(
-        "--layers-are-samples", o.layersAreSamples,
-        "Average the samples of a dump that looks like a deep image of layers, which is else refused");
-    app.add_option(
-           "--band", o.band,
-           "krige: only band I of N, cut by rows from the top: the same pixels, bit for bit, that the "
-           "whole image has there, with its display window")
-        ->option_text("I/N");
-    app.add_option("--sampling-map", o.samplingMap,
-                   "Also write where more samples would lower the error most: an EXR image with channel "
-                   "sampling.density, for vlx-trace --append --sample-map (not with --method gaussian)")
-        ->option_text("IMAGE");
-    app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
-    app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
-        ->check(vlx::finitePositive())
-        ->capture_default_str();
-    auto* region = app.add_option("--region", o.paper.regionSize, "paper: side of a region in pixels")
-                       ->check(CLI::Range(1, 64))
-                       ->capture_default_str();
-    app.add_flag("--whole-image", o.wholeImage,
-                 "paper: the whole image is one region (for a few samples scattered over an image)")
-        ->excludes(region);
-    app.add_flag("--no-colour-distance", o.noColourDistance,
-                 "paper: distance on the image plane only, to show what the colour distance does");
-    app.add_flag(
-        "--diagnostics", o.diagnostics,
-        "paper: also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) "
-        "and OUTPUT.json with everything about each region");
-    app.add_option(
-           "--inspect", o.inspect,
-           "With --diagnostics: put the variogram cloud, its classes and cross-validation of the region "
-           "of this pixel into OUTPUT.json; repeatable")
-        ->option_text("X,Y")
-        ->take_all()
-        ->expected(1);
-    app.add_flag("--json", o.json, "Print the report as JSON on standard output");
-    app.add_option(
-           "--frames", o.frames,
-           "Krige these frames, for example 1-100x2,150: #### in the names of files stands for the frame's "
-           "number. When a frame fails the others go on")
-        ->option_text("LIST");
-    vlx::addOverwrite(app, o.overwrite);
-    app.add_option(
-           "--max-memory", o.maxMemory,
-           "krige: memory of the process at most, for example 2G or 500M (10^9, 10^6 bytes): fewer rows "
-           "are read at a time, and less than a picture of that width needs (170M or more) is refused. The "
-           "result does not depend on it")
-        ->option_text("SIZE");
-    app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
-        ->check(CLI::Range(0, 1024))
-        ->capture_default_str();
-    o.moments.bind(app, "Flat images (--map also says where --template has R, G, B)");
-    app.footer(
-        "Examples:\n"
-        "  vlx-krige samples.exr -o image.exr\n"
-        "  vlx-krige beauty.exr -o denoised.exr --radiance key --radiance fill\n"
-        "  vlx-krige samples.exr -o denoised.exr --template beauty.exr\n"
-        "  vlx-krige samples.exr -o blurred.exr --method gaussian --sigma 1.5\n"
-        "  vlx-krige room_####.exr -o kriged_####.exr --frames 1-100\n"
-        "Samples that are not finite are left out and counted. Regions that cannot be kriged\n"
-        "get their mean and are counted.");
-}
-
-const std::vector<vlx::OptionUse>& usesByMethod() {
-    static const std::vector<vlx::OptionUse> uses = {
-        {{"--quality", "--fireflies", "--strength", "--feature", "--radiance", "--scale", "--filter",
-          "--band", "--no-features", "--max-memory"},
-         {"--method krige"}},
-        {{"--clamp"}, {"--fireflies clamp"}},
-        {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
-        {{"--sigma"}, {"--method gaussian"}},
-        {{"--region", "--whole-image", "--no-colour-distance", "--diagnostics"}, {"--method paper"}},
-        {{"--inspect"}, {"--diagnostics"}},
-        {{"--positions"},
-         {"--method paper", "--scale 2 to 4", "--filter gaussian", "--filter blackman-harris"}}};
-    return uses;
-}
-
-const std::vector<vlx::OptionUse>& usesByInput() {
-    static const std::vector<vlx::OptionUse> uses = {
-        {{"--preset", "--variance-is", "--variance-of", "--variance", "--albedo", "--normal", "--depth",
-          "--samples", "--drop-layers"},
-         {"a flat image"}},
-        {{"--map"}, {"a flat image", "--template"}},
-        {{"--layers-are-samples", "--positions"}, {"a dump"}}};
-    return uses;
-}
-
-void checkMethodOptions(const Options& o) {
-    std::vector<std::string> atHand;
-    for (const char* option : {"--method", "--fireflies", "--filter"})
-        atHand.push_back(std::string(option) + " " + o.commandLine->get_option(option)->as<std::string>());
-    if (o.krige.scale > 1) atHand.emplace_back("--scale 2 to 4");
-    if (o.diagnostics) atHand.emplace_back("--diagnostics");
-    vlx::checkOptionUse(*o.commandLine, usesByMethod(), atHand);
-}
-
 // The samples of a dump, or those that the moments of a flat image stand for.
-std::unique_ptr<vlx::SampleSource> openInput(const Options& o, bool flat) {
+std::unique_ptr<vlx::SampleSource> openInput(const vlx::KrigeOptions& o, bool flat) {
     if (!flat) {
         auto dump = std::make_unique<vlx::DumpReader>(o.input);
-        vlx::checkOptionUse(*o.commandLine, usesByInput(),
-                            {"a dump", o.layersOf.empty() ? "" : "--template"});
+        vlx::checkInputOptions(o, {"a dump", o.layersOf.empty() ? "" : "--template"});
         if (const std::string by = o.layersAreSamples ? "" : vlx::layersFoundBy(*dump); !by.empty())
             throw vlx::Error(o.input, "expected samples of the camera, found layers to be composited (" + by +
                                           "), whose average is no image: flatten it where it was made, or "
                                           "average them all the same with --layers-are-samples");
         return dump;
     }
-    vlx::checkOptionUse(*o.commandLine, usesByInput(), {"a flat image"});
+    vlx::checkInputOptions(o, {"a flat image"});
     vlx::MomentOptions options = o.moments.options();
     options.radiance = o.krige.radiance;
     for (const std::string& feature : o.krige.features) options.map.try_emplace(feature, feature);
@@ -273,7 +72,7 @@ vlx::Image channelsOf(const vlx::Image& image, const std::function<bool(const st
 }
 
 // Which layers of the file to be copied the image replaces: of a flat input those that it was made of.
-vlx::ChannelMap replacedLayers(const Options& o, const std::string& original,
+vlx::ChannelMap replacedLayers(const vlx::KrigeOptions& o, const std::string& original,
                                const vlx::SampleSource& source) {
     vlx::ChannelMap map;
     if (const auto* moments = dynamic_cast<const vlx::ImportedSamples*>(&source);
@@ -288,19 +87,19 @@ vlx::ChannelMap replacedLayers(const Options& o, const std::string& original,
 }
 
 /// By the methods that hold the image whole.
-vlx::Reconstruction reconstruct(const Options& o, const vlx::SampleSource& dump,
+vlx::Reconstruction reconstruct(const vlx::KrigeOptions& o, const vlx::SampleSource& dump,
                                 const vlx::Progress& progress) {
     switch (o.method) {
-        case Method::Krige: {
+        case vlx::KrigeMethod::Krige: {
             vlx::Reconstruction result = vlx::reconstructDriftKriging(dump, o.krige, progress);
             result.image = vlx::applyPixelFilter(result.image, o.filter);
             return result;
         }
-        case Method::Paper:
+        case vlx::KrigeMethod::Paper:
             return vlx::reconstructPaper(dump, o.paper, progress);
-        case Method::Mean:
+        case vlx::KrigeMethod::Mean:
             return vlx::reconstructMean(dump, progress);
-        case Method::Gaussian:
+        case vlx::KrigeMethod::Gaussian:
             break;
     }
     // A pixel without samples has no part in its neighbours.
@@ -320,30 +119,9 @@ void writeText(const vlx::OutputFile& file, const std::string& text) {
     if (!stream) throw vlx::Error(file.path(), "writing failed");
 }
 
-std::pair<int, int> parsePixel(const std::string& text) {
-    int x = 0, y = 0, end = 0;
-    if (std::sscanf(text.c_str(), "%d,%d%n", &x, &y, &end) != 2 ||
-        static_cast<std::size_t>(end) != text.size())
-        throw CLI::ValidationError("--inspect", "expected X,Y in pixels, found '" + text + "'");
-    return {x, y};
-}
-
 std::string inWords(const vlx::Window& w) {
     return "columns " + std::to_string(w.x) + " to " + std::to_string(w.x + (w.width - 1)) + " and rows " +
            std::to_string(w.y) + " to " + std::to_string(w.y + (w.height - 1));
-}
-
-/// "2G", "500M".
-std::uint64_t parseMemory(const std::string& text) {
-    double value = 0;
-    char unit = 0;
-    int end = 0;
-    if (std::sscanf(text.c_str(), "%lf%c%n", &value, &unit, &end) != 2 ||
-        static_cast<std::size_t>(end) != text.size() || (unit != 'G' && unit != 'M') || !(value > 0) ||
-        value > 1e9)
-        throw CLI::ValidationError("--max-memory",
-                                   "expected a size such as 2G or 500M, found '" + text + "'");
-    return static_cast<std::uint64_t>(value * (unit == 'G' ? 1e9 : 1e6));
 }
 
 // On standard error: what became of the layers; warnings also where the report is JSON.
@@ -374,7 +152,7 @@ void tell(const vlx::SampleSource& source, const std::string& original, const vl
     vlx::say(text);
 }
 
-void kriged(const Options& o, const vlx::Progress& progress) {
+void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     std::vector<std::string> files = o.moments.files();
     files.insert(files.end(), {o.input, o.layersOf});
     vlx::checkOutputName(o.image, files);
@@ -411,7 +189,7 @@ void kriged(const Options& o, const vlx::Progress& progress) {
     { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
     const std::unique_ptr<vlx::SampleSource> source = openInput(o, flat);
     const bool usesPositions =
-        o.method == Method::Paper || o.krige.scale > 1 || o.filter != vlx::PixelFilter::Box;
+        o.method == vlx::KrigeMethod::Paper || o.krige.scale > 1 || o.filter != vlx::PixelFilter::Box;
     const vlx::PositionedSamples dump(*source, o.positions, usesPositions);
     for (const auto& [x, y] : o.paper.inspect)
         if (!dump.header().data.contains(x, y))
@@ -422,7 +200,7 @@ void kriged(const Options& o, const vlx::Progress& progress) {
         original.empty() ? vlx::ChannelMap() : replacedLayers(o, original, *source);
     vlx::LayerCopy copied;
     vlx::ReconstructionReport report;
-    if (original.empty() && o.method == Method::Krige && o.filter == vlx::PixelFilter::Box &&
+    if (original.empty() && o.method == vlx::KrigeMethod::Krige && o.filter == vlx::PixelFilter::Box &&
         o.samplingMap.empty()) {
         const vlx::Image outline = vlx::driftKrigingOutline(dump, o.krige);
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
@@ -466,8 +244,8 @@ void kriged(const Options& o, const vlx::Progress& progress) {
     }
 }
 
-int run(Options& o) {
-    checkMethodOptions(o);
+int run(vlx::KrigeOptions& o) {
+    vlx::checkMethodOptions(o);
     o.paper.colourDistance = !o.noColourDistance;
     if (o.wholeImage) o.paper.regionSize = 0;
     o.krige.standardFeatures = !o.noFeatures;
@@ -476,11 +254,11 @@ int run(Options& o) {
         if (o.filter != vlx::PixelFilter::Box)  // it reaches into the bands beside
             throw CLI::ValidationError("--band goes with --filter box");
     }
-    for (const std::string& text : o.inspect) o.paper.inspect.push_back(parsePixel(text));
+    for (const std::string& text : o.inspect) o.paper.inspect.push_back(vlx::parsePixel(text));
     if (!o.maxMemory.empty()) {
         if (o.filter != vlx::PixelFilter::Box || !o.samplingMap.empty())
             throw CLI::ValidationError("--max-memory goes with --filter box and no --sampling-map");
-        o.krige.maxMemory = parseMemory(o.maxMemory);
+        o.krige.maxMemory = vlx::parseMemory(o.maxMemory);
 #ifdef __GLIBC__
         mallopt(M_MMAP_THRESHOLD, 1 << 20);  // what is done with is given back
 #endif
@@ -495,7 +273,7 @@ int run(Options& o) {
     vlx::requireFramePlace("--output", o.image);
     if (!o.samplingMap.empty()) vlx::requireFramePlace("--sampling-map", o.samplingMap);
     vlx::forEachFrame(vlx::parseFrames(o.frames), bar, [&](int frame, const vlx::Progress& progress) {
-        Options one = o;
+        vlx::KrigeOptions one = o;
         std::vector<std::string*> names = one.moments.fileNames();
         names.insert(names.end(), {&one.input, &one.image, &one.samplingMap, &one.layersOf});
         for (std::string* name : names) *name = vlx::frameName(*name, frame);
@@ -511,7 +289,7 @@ int main(int argc, char** argv) {
         "Removes the noise of a path-traced image by kriging its samples, and says how accurate the result "
         "is.",
         "vlx-krige");
-    Options options;
-    bind(app, options);
+    vlx::KrigeOptions options;
+    vlx::bindOptions(app, options);
     return vlx::runTool(argc, argv, app, [&] { return run(options); });
 }

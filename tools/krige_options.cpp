@@ -1,0 +1,201 @@
+#include "krige_options.h"
+
+#include <cstdio>
+
+#include "finished.h"
+#include "tool_main.h"
+
+namespace vlx {
+
+namespace {
+
+const std::vector<OptionUse>& usesByMethod() {
+    static const std::vector<OptionUse> uses = {
+        {{"--quality", "--fireflies", "--strength", "--feature", "--radiance", "--scale", "--filter",
+          "--band", "--no-features", "--max-memory"},
+         {"--method krige"}},
+        {{"--clamp"}, {"--fireflies clamp"}},
+        {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
+        {{"--sigma"}, {"--method gaussian"}},
+        {{"--region", "--whole-image", "--no-colour-distance", "--diagnostics"}, {"--method paper"}},
+        {{"--inspect"}, {"--diagnostics"}},
+        {{"--positions"},
+         {"--method paper", "--scale 2 to 4", "--filter gaussian", "--filter blackman-harris"}}};
+    return uses;
+}
+
+const std::vector<OptionUse>& usesByInput() {
+    static const std::vector<OptionUse> uses = {
+        {{"--preset", "--variance-is", "--variance-of", "--variance", "--albedo", "--normal", "--depth",
+          "--samples", "--drop-layers"},
+         {"a flat image"}},
+        {{"--map"}, {"a flat image", "--template"}},
+        {{"--layers-are-samples", "--positions"}, {"a dump"}}};
+    return uses;
+}
+
+}  // namespace
+
+void bindOptions(CLI::App& app, KrigeOptions& o) {
+    o.commandLine = &app;
+    app.add_option(
+           "INPUT", o.input,
+           "Sample dump (deep OpenEXR) of any renderer, or a flat image with the variance of its pixels")
+        ->required();
+    app.add_option(
+           "-o,--output", o.image,
+           "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
+           "deviation of the error of R, G, B). Of a flat OpenEXR image: a copy with all its layers and "
+           "parts, R, G, B, A and named radiance denoised, stddev added")
+        ->required();
+    app.add_option(
+           "--template", o.layersOf,
+           "Put the result into a copy of this flat OpenEXR file of the same size, as of a flat input")
+        ->option_text("IMAGE");
+    app.add_flag("--drop-layers", o.dropLayers, "Of a flat image: write only what is denoised, and stddev")
+        ->excludes("--template");
+    addChoice(
+        app, "--method", o.method,
+        {{"krige", KrigeMethod::Krige},
+         {"paper", KrigeMethod::Paper},
+         {"mean", KrigeMethod::Mean},
+         {"gaussian", KrigeMethod::Gaussian}},
+        "krige: kriging with the features as external drift, in overlapping neighbourhoods; paper: "
+        "kriging by region (Yue and Nishita); mean: plain average of each pixel's samples, its stddev the "
+        "plain standard error, 0 where they agree; "
+        "gaussian: the average, Gaussian filtered (no layer stddev)");
+    addChoice(app, "--quality", o.krige.quality,
+              {{"draft", Quality::Draft}, {"standard", Quality::Standard}, {"high", Quality::High}},
+              "krige: draft: one model, sparse neighbourhoods; standard: three models; high: neighbourhoods "
+              "twice as dense along each axis");
+    addChoice(app, "--fireflies", o.krige.fireflies,
+              {{"keep", Fireflies::Keep}, {"robust", Fireflies::Robust}, {"clamp", Fireflies::Clamp}},
+              "krige: samples far brighter than all around. keep: unbiased and noisy; robust: the brightest "
+              "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
+              "What was removed is reported");
+    app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
+        ->check(finitePositive())
+        ->capture_default_str();
+    app.add_option("--strength", o.krige.strength,
+                   "krige: 0 keeps the plain average (of what --fireflies leaves), 1 takes the estimate")
+        ->check(finiteWithin(0, 1))
+        ->capture_default_str();
+    app.add_option(
+        "--feature", o.krige.features,
+        "krige: a further channel of the dump to use as drift, besides albedo, N and Z; repeatable");
+    app.add_option(
+        "--radiance", o.krige.radiance,
+        "krige: a further channel or layer to estimate with the same weights as R, G, B (a light group): "
+        "parts still add up; repeatable");
+    app.add_option("--scale", o.krige.scale,
+                   "krige: pixels of the image along each axis for one of the dump; needs sample positions")
+        ->check(CLI::Range(1, 4))
+        ->capture_default_str();
+    addChoice(app, "--filter", o.filter,
+              {{"box", PixelFilter::Box},
+               {"gaussian", PixelFilter::Gaussian},
+               {"blackman-harris", PixelFilter::BlackmanHarris}},
+              "krige: pixel filter of the result. box: averages over pixels; gaussian: standard deviation "
+              "0.5, radius 1.5; blackman-harris: radius 1.5 pixels");
+    std::vector<std::pair<std::string, PositionConvention>> conventions;
+    for (const auto& known : positionConventions()) conventions.emplace_back(known.name, known.convention);
+    addChoice(app, "--positions", o.positions, conventions,
+              "What sample.x and sample.y of the dump are, where they are used (--scale, --filter, paper). "
+              "raster: pixels, downwards; others are recognised and told");
+    app.add_flag(
+        "--layers-are-samples", o.layersAreSamples,
+        "Average the samples of a dump that looks like a deep image of layers, which is else refused");
+    app.add_option(
+           "--band", o.band,
+           "krige: only band I of N, cut by rows from the top: the same pixels, bit for bit, that the "
+           "whole image has there, with its display window")
+        ->option_text("I/N");
+    app.add_option("--sampling-map", o.samplingMap,
+                   "Also write where more samples would lower the error most: an EXR image with channel "
+                   "sampling.density, for vlx-trace --append --sample-map (not with --method gaussian)")
+        ->option_text("IMAGE");
+    app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
+    app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
+        ->check(finitePositive())
+        ->capture_default_str();
+    auto* region = app.add_option("--region", o.paper.regionSize, "paper: side of a region in pixels")
+                       ->check(CLI::Range(1, 64))
+                       ->capture_default_str();
+    app.add_flag("--whole-image", o.wholeImage,
+                 "paper: the whole image is one region (for a few samples scattered over an image)")
+        ->excludes(region);
+    app.add_flag("--no-colour-distance", o.noColourDistance,
+                 "paper: distance on the image plane only, to show what the colour distance does");
+    app.add_flag(
+        "--diagnostics", o.diagnostics,
+        "paper: also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) "
+        "and OUTPUT.json with everything about each region");
+    app.add_option(
+           "--inspect", o.inspect,
+           "With --diagnostics: put the variogram cloud, its classes and cross-validation of the region "
+           "of this pixel into OUTPUT.json; repeatable")
+        ->option_text("X,Y")
+        ->take_all()
+        ->expected(1);
+    app.add_flag("--json", o.json, "Print the report as JSON on standard output");
+    app.add_option(
+           "--frames", o.frames,
+           "Krige these frames, for example 1-100x2,150: #### in the names of files stands for the frame's "
+           "number. When a frame fails the others go on")
+        ->option_text("LIST");
+    addOverwrite(app, o.overwrite);
+    app.add_option(
+           "--max-memory", o.maxMemory,
+           "krige: memory of the process at most, for example 2G or 500M (10^9, 10^6 bytes): fewer rows "
+           "are read at a time, and less than a picture of that width needs (170M or more) is refused. The "
+           "result does not depend on it")
+        ->option_text("SIZE");
+    app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
+        ->check(CLI::Range(0, 1024))
+        ->capture_default_str();
+    o.moments.bind(app, "Flat images (--map also says where --template has R, G, B)");
+    app.footer(
+        "Examples:\n"
+        "  vlx-krige samples.exr -o image.exr\n"
+        "  vlx-krige beauty.exr -o denoised.exr --radiance key --radiance fill\n"
+        "  vlx-krige samples.exr -o denoised.exr --template beauty.exr\n"
+        "  vlx-krige samples.exr -o blurred.exr --method gaussian --sigma 1.5\n"
+        "  vlx-krige room_####.exr -o kriged_####.exr --frames 1-100\n"
+        "Samples that are not finite are left out and counted. Regions that cannot be kriged\n"
+        "get their mean and are counted.");
+}
+
+void checkMethodOptions(const KrigeOptions& o) {
+    std::vector<std::string> atHand;
+    for (const char* option : {"--method", "--fireflies", "--filter"})
+        atHand.push_back(std::string(option) + " " + o.commandLine->get_option(option)->as<std::string>());
+    if (o.krige.scale > 1) atHand.emplace_back("--scale 2 to 4");
+    if (o.diagnostics) atHand.emplace_back("--diagnostics");
+    checkOptionUse(*o.commandLine, usesByMethod(), atHand);
+}
+
+void checkInputOptions(const KrigeOptions& o, const std::vector<std::string>& atHand) {
+    checkOptionUse(*o.commandLine, usesByInput(), atHand);
+}
+
+std::pair<int, int> parsePixel(const std::string& text) {
+    int x = 0, y = 0, end = 0;
+    if (std::sscanf(text.c_str(), "%d,%d%n", &x, &y, &end) != 2 ||
+        static_cast<std::size_t>(end) != text.size())
+        throw CLI::ValidationError("--inspect", "expected X,Y in pixels, found '" + text + "'");
+    return {x, y};
+}
+
+std::uint64_t parseMemory(const std::string& text) {
+    double value = 0;
+    char unit = 0;
+    int end = 0;
+    if (std::sscanf(text.c_str(), "%lf%c%n", &value, &unit, &end) != 2 ||
+        static_cast<std::size_t>(end) != text.size() || (unit != 'G' && unit != 'M') || !(value > 0) ||
+        value > 1e9)
+        throw CLI::ValidationError("--max-memory",
+                                   "expected a size such as 2G or 500M, found '" + text + "'");
+    return static_cast<std::uint64_t>(value * (unit == 'G' ? 1e9 : 1e6));
+}
+
+}  // namespace vlx

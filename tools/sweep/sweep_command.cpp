@@ -1,0 +1,88 @@
+#include "sweep/sweep_command.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <sstream>
+#include <utility>
+
+#include "sweep/sweep_store.h"
+#include "variolux/base/error.h"
+
+namespace vlx {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+}  // namespace
+
+std::string filled(std::string text, const std::map<std::string, std::string>& places) {
+    for (std::size_t at = text.find('{'); at != std::string::npos; at = text.find('{', at)) {
+        const std::size_t end = text.find('}', at);
+        const auto place =
+            end == std::string::npos ? places.end() : places.find(text.substr(at + 1, end - at - 1));
+        if (place == places.end()) {
+            ++at;  // a brace of the shell's
+            continue;
+        }
+        text.replace(at, end - at + 1, place->second);
+        at += place->second.size();
+    }
+    return text;
+}
+
+std::string firstWord(const std::string& command) { return command.substr(0, command.find(' ')); }
+
+std::string namedFiles(const std::string& command) {
+    std::string identities;
+    std::istringstream words(command);
+    std::error_code ignored;
+    for (std::string word; words >> word;)
+        if (fs::is_regular_file(word, ignored)) identities += fileIdentity(word);
+    return identities;
+}
+
+std::string numberText(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value);
+    return text;
+}
+
+Json reportOf(const ProcessRun& run, const std::string& command) {
+    Json report = Json::parse(run.out, nullptr, false);
+    if (!report.is_object()) throw Error(command, "expected a JSON report on standard output");
+    return report;
+}
+
+std::map<std::string, double> stagesOf(const ProcessRun& run) {
+    std::map<std::string, double> stages;
+    const Json report = Json::parse(run.out, nullptr, false);
+    if (report.is_object()) {
+        if (const auto seconds = report.find("seconds"); seconds != report.end() && seconds->is_object()) {
+            for (const auto& [stage, value] : seconds->items())
+                if (value.is_number()) stages[stage] = value;
+        } else {
+            for (const auto& [field, stage] : {std::pair{"readSeconds", "read"}, {"solveSeconds", "solve"}})
+                if (const auto value = report.find(field); value != report.end() && value->is_number())
+                    stages[stage] = *value;
+        }
+    }
+    double rest = run.seconds;
+    for (const auto& [stage, value] : stages) rest -= value;
+    stages["other"] = std::max(0.0, rest);
+    return stages;
+}
+
+std::string failureOf(const ProcessRun& run) {
+    std::string text = run.err;
+    text.erase(text.find_last_not_of(" \n") + 1);
+    const std::size_t end = text.rfind('\n');
+    if (end != std::string::npos) text = text.substr(end + 1);
+    for (char& c : text)  // a terminal would obey them
+        if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
+    return "exit code " + std::to_string(run.exitCode) + (text.empty() ? "" : ": " + text);
+}
+
+}  // namespace vlx

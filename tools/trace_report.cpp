@@ -1,0 +1,109 @@
+#include "trace_report.h"
+
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "render/pilot/pilot.h"
+#include "tool_main.h"
+#include "variolux/base/parallel.h"
+
+namespace vlx::render {
+
+void note(const TraceOptions& o, const std::string& text) { say(o.scene + ": " + text); }
+
+int printCameras(const TraceOptions& o, const Scene& loaded) {
+    for (const std::string& warning : loaded.report.warnings) note(o, "warning: " + warning);
+    for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
+        const Camera& c = loaded.cameras[i];
+        std::cout << i << "  " << c.name
+                  << (i == loaded.activeCamera && c.unusable.empty() ? "  (active)" : "")
+                  << (c.unusable.empty() ? "" : "  unusable: " + c.unusable) << "\n";
+    }
+    return kDone;
+}
+
+int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, const IntegratorChoice& choice) {
+    const auto shares = pilotShares(loaded, plan, o.render);
+    if (o.explain == "json") {
+        nlohmann::ordered_json list = nlohmann::ordered_json::array();
+        for (const PlannedEffect& e : plan.effects) {
+            nlohmann::ordered_json j{
+                {"name", nameOf(e.effect)}, {"planned", e.planned}, {"reason", e.reason}};
+            const auto share = shares[static_cast<std::size_t>(e.effect)];
+            if (share) j["share"] = std::round(*share * 1000) / 1000;
+            list.push_back(std::move(j));
+        }
+        const nlohmann::ordered_json features{{"albedo", plan.features.albedo},
+                                              {"normal", plan.features.normalAndDepth},
+                                              {"depth", plan.features.normalAndDepth}};
+        const nlohmann::ordered_json chosen{{"chosen", nameOf(choice.chosen)}, {"reason", choice.reason}};
+        std::cout << nlohmann::ordered_json{{"effects", list},
+                                            {"lights", loaded.lights.size()},
+                                            {"recorded", features},
+                                            {"integrator", chosen}}
+                         .dump(2)
+                  << "\n";
+        return kDone;
+    }
+    std::printf("%-19s%-9s%-7s%s\n", "effect", "planned", "cost", "reason");
+    for (const PlannedEffect& e : plan.effects) {
+        const auto share = shares[static_cast<std::size_t>(e.effect)];
+        const std::string cost = share ? std::to_string(std::lround(*share * 100)) + " %" : "";
+        std::printf("%-19s%-9s%-7s%s\n", std::string(nameOf(e.effect)).c_str(), e.planned ? "yes" : "no",
+                    cost.c_str(), e.reason.c_str());
+    }
+    if (!plan.features.albedo)
+        std::printf("not recorded: %s, %s\n",
+                    plan.features.normalAndDepth ? "albedo" : "albedo, normal and depth",
+                    plan.features.reason.c_str());
+    std::printf("integrator %s: %s\n", std::string(nameOf(choice.chosen)).c_str(), choice.reason.c_str());
+    return kDone;
+}
+
+int printSkipped(const TraceOptions& o) {
+    if (o.json)
+        std::cout << nlohmann::ordered_json{{"scene", o.scene}, {"dump", o.dump}, {"skipped", true}}.dump(2)
+                  << "\n";
+    return kDone;
+}
+
+void summarize(const TraceOptions& o, const Scene& loaded, const RenderReport& report) {
+    const double seconds = report.traceSeconds;
+    const double rate = seconds > 0 ? static_cast<double>(report.samples) / seconds * 1e-6 : 0;
+    const double cpu = report.traceCpuSeconds;
+    const double share = cpu > 0 ? report.writeCpuSeconds / cpu : 0;
+    if (o.json) {
+        nlohmann::ordered_json j{{"scene", o.scene},
+                                 {"dump", o.dump},
+                                 {"camera", loaded.cameras[o.render.camera].name},
+                                 {"width", o.render.width},
+                                 {"height", o.render.height},
+                                 {"triangles", loaded.triangleCount()},
+                                 {"lights", loaded.lights.size()},
+                                 {"effects", o.render.plan->simulated()},
+                                 {"integrator", nameOf(o.render.integrator)},
+                                 {"samples", report.samples},
+                                 {"nonFinite", report.nonFinite},
+                                 {"degenerateTriangles", loaded.report.degenerateTriangles},
+                                 {"threads", threadCount()},
+                                 {"traceSeconds", seconds},
+                                 {"megasamplesPerSecond", rate},
+                                 {"traceCpuSeconds", report.traceCpuSeconds},
+                                 {"writeCpuSeconds", report.writeCpuSeconds},
+                                 {"warnings", loaded.report.warnings}};
+        if (!o.render.hierarchical) j["samplesPerPixel"] = o.render.spp;
+        if (o.render.hierarchical) j["refinedCells"] = report.refinedCells;
+        std::cout << j.dump(2) << "\n";
+    }
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "%llu samples in %.2f s (%.3f Msamples/s, %d threads); compressing and writing took "
+                  "%.2f processor seconds (%.1f %% of tracing's)",
+                  static_cast<unsigned long long>(report.samples), seconds, rate, threadCount(),
+                  report.writeCpuSeconds, 100 * share);
+    say(o.dump + ": " + text);
+}
+
+}  // namespace vlx::render

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+
+#include "trace_options.h"
+
+/// What vlx-trace prints.
+namespace vlx::render {
+
+/// A line on standard error, about the scene.
+void note(const TraceOptions& o, const std::string& text);
+
+// Each returns an ExitCode.
+int printCameras(const TraceOptions& o, const Scene& loaded);
+int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, const IntegratorChoice& choice);
+/// That the work was finished before.
+int printSkipped(const TraceOptions& o);
+
+void summarize(const TraceOptions& o, const Scene& loaded, const RenderReport& report);
+
+}  // namespace vlx::render
