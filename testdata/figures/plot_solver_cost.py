@@ -16,7 +16,6 @@ SERIES = [
     ("bare LLT", "#777777", "5 3", 2),
     ("double", "#1b5fa8", "", 1.6),
     ("float, refined", "#eda24f", "", 4.2),
-    ("batched", "#86cf9f", "", 7),
     ("full-pivot LU, bordered", "#b3322e", "", 1.6),
 ]
 NUMBER = r"[-+0-9.e]+"
