@@ -29,6 +29,8 @@ def read(path):
             section = "errors"
         elif "microseconds a system" in line:
             section = "times" if line.startswith("Stable") else None
+        elif "milliseconds a system" in line:  # of more digits: not drawn
+            section = None
         numbers = [float(x) for x in re.findall(NUMBER, re.sub(r"\([^)]*\)|\|", " ", line))] if re.match(r" *\d", line) else []
         if section == "times" and numbers:
             times.append(numbers)
