@@ -115,7 +115,7 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
                    "sampling.density, for vlx-trace --append --sample-map (not with --method gaussian)")
         ->option_text("IMAGE");
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
-    app.add_option("--sigma", o.sigma, "gaussian: standard deviation in pixels")
+    app.add_option("--sigma", o.gaussian.sigma, "gaussian: standard deviation in pixels")
         ->check(finitePositive())
         ->capture_default_str();
     auto* region = app.add_option("--region", o.paper.regionSize, "paper: side of a region in pixels")
@@ -163,6 +163,20 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
         "  vlx-krige room_####.exr -o kriged_####.exr --frames 1-100\n"
         "Samples that are not finite are left out and counted. Regions that cannot be kriged\n"
         "get their mean and are counted.");
+}
+
+Method methodOf(const KrigeOptions& o) {
+    switch (o.method) {
+        case KrigeMethod::Krige:
+            return o.krige;
+        case KrigeMethod::Paper:
+            return o.paper;
+        case KrigeMethod::Mean:
+            return Mean{};
+        case KrigeMethod::Gaussian:
+            break;
+    }
+    return o.gaussian;
 }
 
 void checkMethodOptions(const KrigeOptions& o) {

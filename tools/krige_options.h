@@ -8,9 +8,8 @@
 
 #include "import_options.h"
 #include "variolux/dump/positions.h"
-#include "variolux/reconstruct/drift_kriging.h"
-#include "variolux/reconstruct/paper.h"
 #include "variolux/reconstruct/pixel_filter.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 /// What vlx-krige is asked for.
 namespace vlx {
@@ -24,15 +23,15 @@ struct KrigeOptions {
     bool dropLayers = false;
     std::string image;
     KrigeMethod method = KrigeMethod::Krige;
-    DriftKrigingOptions krige;
+    Drift krige;
     PixelFilter filter = PixelFilter::Box;
     std::string band;
     std::string samplingMap;
     bool noFeatures = false;
     PositionConvention positions = PositionConvention::Raster;
     bool layersAreSamples = false;
-    double sigma = 1;
-    PaperOptions paper;
+    Gaussian gaussian;
+    Paper paper;
     bool noColourDistance = false;
     bool wholeImage = false;
     bool diagnostics = false;
@@ -46,6 +45,9 @@ struct KrigeOptions {
 };
 
 void bindOptions(CLI::App& app, KrigeOptions& o);
+
+/// The method asked for, with its options.
+Method methodOf(const KrigeOptions& o);
 
 /// Throws CLI::ValidationError when an option was given that the method, or its other options, do not read.
 void checkMethodOptions(const KrigeOptions& o);

@@ -19,6 +19,7 @@
 #include "progress_bar.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
+#include "variolux/base/parallel.h"
 
 namespace vlx {
 
@@ -154,9 +155,7 @@ void setFormatter(CLI::App& app, const std::shared_ptr<CLI::FormatterBase>& form
         setFormatter(*command, formatter);
 }
 
-}  // namespace
-
-int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run) {
+int runToEnd(int argc, char** argv, CLI::App& app, const std::function<int()>& run) {
     // A file size limit must end in an error message and a clean folder, like a full disk, not in a signal.
     std::signal(SIGXFSZ, SIG_IGN);
     catchSignals();
@@ -187,6 +186,14 @@ int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& ru
     } catch (const std::exception& error) {
         return fail(app, std::string("internal error: ") + error.what());
     }
+}
+
+}  // namespace
+
+int runTool(int argc, char** argv, CLI::App& app, const std::function<int()>& run) {
+    const int code = runToEnd(argc, argv, app, run);
+    endThreads();
+    return code;
 }
 
 void onEndingSignal(void (*action)() noexcept) { endingAction = action; }

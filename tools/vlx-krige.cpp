@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
-#include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,14 +20,11 @@
 #include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
-#include "variolux/compare/gaussian.h"
 #include "variolux/dump/layers.h"
 #include "variolux/dump/positions.h"
 #include "variolux/dump/reader.h"
-#include "variolux/reconstruct/drift_kriging.h"
-#include "variolux/reconstruct/mean.h"
-#include "variolux/reconstruct/paper.h"
 #include "variolux/reconstruct/pixel_filter.h"
+#include "variolux/reconstruct/reconstruct.h"
 #include "variolux/reconstruct/sampling_map.h"
 
 namespace {
@@ -52,23 +47,11 @@ std::unique_ptr<vlx::SampleSource> openInput(const vlx::KrigeOptions& o, bool fl
     return vlx::openMoments(o.input, options);
 }
 
-// The channels of an image that a predicate holds for.
-vlx::Image channelsOf(const vlx::Image& image, const std::function<bool(const std::string&)>& wanted) {
-    std::vector<int> taken;
-    std::vector<std::string> names;
-    for (int c = 0; c < image.channelCount(); ++c)
-        if (const std::string& name = image.channels[static_cast<std::size_t>(c)]; wanted(name)) {
-            taken.push_back(c);
-            names.push_back(name);
-        }
-    vlx::Image result(image.data, names);
-    result.display = image.display;
-    for (int row = 0; row < image.data.height; ++row)
-        for (int col = 0; col < image.data.width; ++col) {
-            const float* from = image.at(col, row);
-            std::transform(taken.begin(), taken.end(), result.at(col, row), [&](int c) { return from[c]; });
-        }
-    return result;
+// A file without A gets none.
+vlx::Image withoutNewAlpha(const vlx::Image& image, const vlx::ChannelMap& replaced) {
+    std::vector<std::string> channels = image.channels;
+    if (!replaced.contains("A")) std::erase(channels, "A");
+    return image.select(channels);
 }
 
 // Which layers of the file to be copied the image replaces: of a flat input those that it was made of.
@@ -84,32 +67,6 @@ vlx::ChannelMap replacedLayers(const vlx::KrigeOptions& o, const std::string& or
         return entry.first != "R" && entry.first != "G" && entry.first != "B" && entry.first != "A";
     });
     return map;
-}
-
-/// By the methods that hold the image whole.
-vlx::Reconstruction reconstruct(const vlx::KrigeOptions& o, const vlx::SampleSource& dump,
-                                const vlx::Progress& progress) {
-    switch (o.method) {
-        case vlx::KrigeMethod::Krige: {
-            vlx::Reconstruction result = vlx::reconstructDriftKriging(dump, o.krige, progress);
-            result.image = vlx::applyPixelFilter(result.image, o.filter);
-            return result;
-        }
-        case vlx::KrigeMethod::Paper:
-            return vlx::reconstructPaper(dump, o.paper, progress);
-        case vlx::KrigeMethod::Mean:
-            return vlx::reconstructMean(dump, progress);
-        case vlx::KrigeMethod::Gaussian:
-            break;
-    }
-    // A pixel without samples has no part in its neighbours.
-    vlx::Reconstruction result =
-        vlx::reconstructMean(dump, progress, std::numeric_limits<float>::quiet_NaN());
-    // The error of a filtered pixel is mostly bias, which this filter cannot know: no stddev layer.
-    const vlx::Image radiance = channelsOf(
-        result.image, [](const std::string& name) { return name == "R" || name == "G" || name == "B"; });
-    result.image = vlx::gaussianFilter(radiance, o.sigma).image;
-    return result;
 }
 
 void writeText(const vlx::OutputFile& file, const std::string& text) {
@@ -200,16 +157,17 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
         original.empty() ? vlx::ChannelMap() : replacedLayers(o, original, *source);
     vlx::LayerCopy copied;
     vlx::ReconstructionReport report;
-    if (original.empty() && o.method == vlx::KrigeMethod::Krige && o.filter == vlx::PixelFilter::Box &&
-        o.samplingMap.empty()) {
-        const vlx::Image outline = vlx::driftKrigingOutline(dump, o.krige);
+    const vlx::Method method = vlx::methodOf(o);
+    if (original.empty() && !o.diagnostics && o.filter == vlx::PixelFilter::Box && o.samplingMap.empty()) {
+        const vlx::Image outline = vlx::outline(dump, method);
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
-        report = vlx::reconstructDriftKriging(
-            dump, o.krige, [&](const float* rows, int count) { writer.write(rows, count); }, progress);
+        report = vlx::reconstruct(
+            dump, method, [&](const float* rows, int count) { writer.write(rows, count); }, progress);
         hash.checkUnchanged();
         writer.close();
     } else {
-        vlx::Reconstruction result = reconstruct(o, dump, progress);
+        vlx::Reconstruction result = vlx::reconstruct(dump, method, progress);
+        result.image = vlx::applyPixelFilter(result.image, o.filter);
         hash.checkUnchanged();
         const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
         if (o.diagnostics) vlx::addDiagnosticLayers(result);
@@ -219,11 +177,8 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
         if (original.empty())
             vlx::writeImage(o.image, result.image, write);
         else
-            copied = vlx::copyWithLayers(
-                original, o.image,
-                channelsOf(result.image,
-                           [&](const std::string& name) { return name != "A" || replaced.contains("A"); }),
-                replaced, {{vlx::kInputsAttribute, inputs}});
+            copied = vlx::copyWithLayers(original, o.image, withoutNewAlpha(result.image, replaced), replaced,
+                                         {{vlx::kInputsAttribute, inputs}});
         if (diagnostics) diagnostics->commit();
         if (!o.samplingMap.empty()) vlx::writeImage(o.samplingMap, map, write);
         report = std::move(result.report);

@@ -43,10 +43,17 @@ void parallelFor(std::int64_t begin, std::int64_t end, const std::function<void(
     if (error) std::rethrow_exception(error);
 }
 
+void endThreads() {}
+
 #else
 
 void parallelFor(std::int64_t begin, std::int64_t end, const std::function<void(std::int64_t)>& body) {
     tbb::parallel_for(begin, end, [&](std::int64_t i) { body(i); });
+}
+
+void endThreads() {
+    tbb::task_scheduler_handle threads{tbb::attach{}};
+    static_cast<void>(tbb::finalize(threads, std::nothrow));  // others may still use them
 }
 
 #endif

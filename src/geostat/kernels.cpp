@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/simd.h"
 #include "geostat/structure_kernel.h"
-#include "geostat/vector_math.h"
 
 namespace vlx::kernels {
 namespace {

@@ -1,9 +1,11 @@
 #pragma once
 
-#include "geostat/vector_math.h"
+#include "base/simd.h"
 #include "variolux/geostat/variogram_model.h"
 
 namespace vlx::kernels {
+
+using namespace simd;
 
 /// rho, or 1 - rho = gamma (not for Matern, where it would cancel), of a unit structure at squared distance
 /// u2 in units of its range. halfShape: alpha / 2 of Stable; nu: Matern's, 1/2, 3/2 or 5/2.

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "../reconstruct/make_band.h"
-#include "variolux/reconstruct/paper.h"
+#include "reconstruct/paper/krige_region.h"
 
 namespace vlx {
 namespace {

@@ -1,5 +1,3 @@
-#include "variolux/reconstruct/drift_kriging.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,8 +8,9 @@
 #include "../base/temporary_folder.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
+#include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
-#include "variolux/reconstruct/mean.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 namespace {
@@ -73,10 +72,10 @@ class DriftKriging : public testing::Test {
         writer.write(band);
         writer.close();
     }
-    Reconstruction krige(const DriftKrigingOptions& options = {}) const {
-        return reconstructDriftKriging(DumpReader(folder_ / "a.exr"), options);
+    Reconstruction krige(const Drift& options = {}) const {
+        return reconstruct(DumpReader(folder_ / "a.exr"), options);
     }
-    Image mean() const { return reconstructMean(DumpReader(folder_ / "a.exr")).image; }
+    Image mean() const { return reconstruct(DumpReader(folder_ / "a.exr"), Mean{}).image; }
 
     TemporaryFolder folder_;
 };
@@ -262,7 +261,7 @@ TEST_F(DriftKriging, OneNonFinitePartCostsTheSampleAndSumsHold) {
             for (float& value : part) value *= layer[0] == 'k' ? 0.25f : 0.75f;
             band.values.push_back(std::move(part));
         }
-    const DriftKrigingOptions options{.radiance = {"key", "fill"}};
+    const Drift options{.radiance = {"key", "fill"}};
     const std::size_t bad = 30 * 8 * 70 + 35 * 8 + 3;
     SampleBand without = band;
     for (auto& channel : without.values) channel.erase(channel.begin() + static_cast<std::ptrdiff_t>(bad));
@@ -357,11 +356,11 @@ TEST_F(DriftKriging, FirefliesAsAskedFor) {
     const Reconstruction robust = krige(), kept = krige({.fireflies = Fireflies::Keep}),
                          clamped = krige({.fireflies = Fireflies::Clamp, .clamp = 8});
     EXPECT_LT(picture.error(robust.image), 0.01);
-    EXPECT_GT(robust.report.energyRemoved, 0.1);  // 5000 of about 34160 samples of 0.6
-    EXPECT_LT(robust.report.energyRemoved, 0.4);
-    EXPECT_EQ(kept.report.limitedSamples, 0);
-    EXPECT_EQ(kept.report.energyRemoved, 0);
-    EXPECT_EQ(clamped.report.limitedSamples, 1);
+    EXPECT_GT(robust.report.drift().energyRemoved, 0.1);  // 5000 of about 34160 samples of 0.6
+    EXPECT_LT(robust.report.drift().energyRemoved, 0.4);
+    EXPECT_EQ(kept.report.drift().limitedSamples, 0);
+    EXPECT_EQ(kept.report.drift().energyRemoved, 0);
+    EXPECT_EQ(clamped.report.drift().limitedSamples, 1);
     EXPECT_GT(plain - total(robust.image), 400);  // 5000 / 8 of light, gone
 }
 
@@ -414,7 +413,7 @@ TEST_F(DriftKriging, ScaleShowsWhatLiesWithinPixels) {
     EXPECT_TRUE(std::equal(band2.pixels.begin(), band2.pixels.end(), whole.image.at(0, 24)));
     write(picture.samples());
     EXPECT_THROW(krige({.scale = 2}), Error);  // no positions
-    EXPECT_TRUE(DriftKrigingOptions{.scale = 5}.validate());
+    EXPECT_TRUE(Drift{.scale = 5}.validate());
 }
 
 TEST_F(DriftKriging, OneSampleAPixelIsEnough) {
@@ -480,10 +479,10 @@ TEST_F(DriftKriging, FewestAndOddestSamples) {
 
 TEST_F(DriftKriging, BadOptionsAreTold) {
     write(Picture{}.samples());
-    EXPECT_TRUE(DriftKrigingOptions{.strength = 2}.validate());
-    EXPECT_TRUE((DriftKrigingOptions{.fireflies = Fireflies::Clamp, .clamp = 0}).validate());
-    EXPECT_TRUE((DriftKrigingOptions{.band = {2, 2}}).validate());
-    EXPECT_FALSE(DriftKrigingOptions{}.validate());
+    EXPECT_TRUE(Drift{.strength = 2}.validate());
+    EXPECT_TRUE((Drift{.fireflies = Fireflies::Clamp, .clamp = 0}).validate());
+    EXPECT_TRUE((Drift{.band = {2, 2}}).validate());
+    EXPECT_FALSE(Drift{}.validate());
     EXPECT_THROW(krige({.strength = -1}), Error);
     EXPECT_THROW(krige({.features = {"no.such"}}), Error);
     EXPECT_THROW(krige({.radiance = {"R"}}), Error);

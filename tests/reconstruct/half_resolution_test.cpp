@@ -16,7 +16,7 @@ constexpr DataPlanes kData{3};
 constexpr CombinedPlanes kCombined{3};
 
 PixelRows pixelRows(int width, int height, int features) {
-    return {RowRing(width, kData.channels(), height), RowRing(width, kSquaresPlanes, height),
+    return {RowRing(width, kData.channels(), height), RowRing(width, SquaresPlanes::kChannels, height),
             RowRing(width, 2 * features, height)};
 }
 
@@ -25,31 +25,32 @@ TEST(HalveRow, MeansStayThoseOfTheSamePixelsAndCountsTellTheirVariance) {
     const float counts[3][3] = {{2, 4, 1}, {0, 4, 0}, {1, 1, 8}};
     for (int y = 0; y < 3; ++y)
         for (int x = 0; x < 3; ++x) {
-            fine.data.row(kData.countA(), y)[x] = counts[y][x];
-            fine.data.row(kData.countB(), y)[x] = 1;
+            fine.data.row(kData.halfCount(0), y)[x] = counts[y][x];
+            fine.data.row(kData.halfCount(1), y)[x] = 1;
             fine.data.row(kData.stated(), y)[x] = x < 2 ? 1 : 0;
             for (int c = 0; c < 3; ++c) {
-                fine.data.row(kData.meanA() + c, y)[x] = static_cast<float>(10 * y + x);
-                fine.data.row(kData.meanB() + c, y)[x] = 5;
+                fine.data.row(kData.mean(0) + c, y)[x] = static_cast<float>(10 * y + x);
+                fine.data.row(kData.mean(1) + c, y)[x] = 5;
             }
-            for (int k = 0; k < kSquaresPlanes; ++k) fine.squares.row(k, y)[x] = static_cast<float>(k + 1);
+            for (int k = 0; k < SquaresPlanes::kChannels; ++k)
+                fine.squares.row(k, y)[x] = static_cast<float>(k + 1);
             fine.raw.row(0, y)[x] = static_cast<float>(x);
             fine.raw.row(1, y)[x] = 0.5f;
         }
     for (int y = 0; y < 2; ++y) halveRow(fine, 3, 3, 3, 1, y, coarse);
     // Three of the four pixels have data of half A: their mean's variance is v (1/2 + 1/4 + 1/4) / 9.
-    EXPECT_FLOAT_EQ(coarse.data.row(kData.countA(), 0)[0], 9);
-    EXPECT_FLOAT_EQ(coarse.data.row(kData.meanA(), 0)[0], (0 + 1 + 11) / 3.f);
-    EXPECT_FLOAT_EQ(coarse.data.row(kData.countB(), 0)[0], 4);
+    EXPECT_FLOAT_EQ(coarse.data.row(kData.halfCount(0), 0)[0], 9);
+    EXPECT_FLOAT_EQ(coarse.data.row(kData.mean(0), 0)[0], (0 + 1 + 11) / 3.f);
+    EXPECT_FLOAT_EQ(coarse.data.row(kData.halfCount(1), 0)[0], 4);
     EXPECT_FLOAT_EQ(coarse.data.row(kData.count(), 0)[0], 13);
     EXPECT_FLOAT_EQ(coarse.data.row(kData.stated(), 0)[0], 1);
     EXPECT_FLOAT_EQ(coarse.squares.row(2, 0)[0], 12);
     EXPECT_FLOAT_EQ(coarse.raw.row(0, 0)[0], 0.5f);
     EXPECT_FLOAT_EQ(coarse.raw.row(1, 0)[0], 0.125f);
     // At the border fewer pixels are one.
-    EXPECT_FLOAT_EQ(coarse.data.row(kData.countA(), 0)[1], 1);
-    EXPECT_FLOAT_EQ(coarse.data.row(kData.meanA(), 0)[1], 2);
-    EXPECT_FLOAT_EQ(coarse.data.row(kData.meanA(), 1)[1], 22);
+    EXPECT_FLOAT_EQ(coarse.data.row(kData.halfCount(0), 0)[1], 1);
+    EXPECT_FLOAT_EQ(coarse.data.row(kData.mean(0), 0)[1], 2);
+    EXPECT_FLOAT_EQ(coarse.data.row(kData.mean(0), 1)[1], 22);
     EXPECT_FLOAT_EQ(coarse.data.row(kData.stated(), 1)[1], 0);
     EXPECT_FLOAT_EQ(coarse.raw.row(1, 1)[1], 0.5f);
 }
@@ -100,7 +101,7 @@ double correctedError(double fineError, double coarseError) {
                     }
                 }
             }
-    RowRing differences(kSide, Correction::differencePlanes(3), kSide),
+    RowRing differences(kSide, DifferencePlanes{}.channels(), kSide),
         corrected(kSide, kCombined.channels(), kSide);
     Correction correction(3, fine.rows(), coarse.rows(), differences, corrected);
     for (int y = 0; y < kSide; ++y) correction.differenceRow(y);
@@ -129,15 +130,15 @@ TEST(Correction, WhereBothAreRightChangesNothing) { EXPECT_LT(correctedError(0, 
 class FinishingTest : public testing::Test {
   protected:
     FinishingTest()
-        : level_(kSide, 4), clean_(kSide, 4, kSide), light_(kSide, Finishing::kLightPlanes, kSide) {
+        : level_(kSide, 4), clean_(kSide, 4, kSide), light_(kSide, LightPlanes::kChannels, kSide) {
         layout_.names = {"R", "G", "B", "key.R"};
         layout_.radiance = 4;
         for (int c = 0; c < 4; ++c) {
             level_.set(level_.combined, planes_.value() + c, c == 3 ? 0.5f : 1.f);
-            level_.set(level_.data, data_.meanA() + c, 1);
-            level_.set(level_.data, data_.meanB() + c, 1);
+            level_.set(level_.data, data_.mean(0) + c, 1);
+            level_.set(level_.data, data_.mean(1) + c, 1);
         }
-        for (const int plane : {data_.countA(), data_.countB()}) level_.set(level_.data, plane, 4);
+        for (const int plane : {data_.halfCount(0), data_.halfCount(1)}) level_.set(level_.data, plane, 4);
         level_.set(level_.data, data_.count(), 8);
     }
     void finish() {

@@ -1,4 +1,4 @@
-#include "variolux/reconstruct/inspection.h"
+#include "reconstruct/common/inspection.h"
 
 #include <gtest/gtest.h>
 

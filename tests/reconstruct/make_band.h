@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
+#include "reconstruct/common/region.h"
 #include "variolux/dump/band.h"
-#include "variolux/reconstruct/region.h"
 
 namespace vlx {
 

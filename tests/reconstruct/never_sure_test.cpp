@@ -11,9 +11,7 @@
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/drift/gap_field.h"
 #include "variolux/dump/sample_buffer.h"
-#include "variolux/reconstruct/drift_kriging.h"
-#include "variolux/reconstruct/mean.h"
-#include "variolux/reconstruct/paper.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 namespace {
@@ -88,7 +86,7 @@ TEST(NeverSure, RareLightIsKeptAndCovered) {
         constexpr int kSeeds = 3;
         for (unsigned seed = 1; seed <= kSeeds; ++seed) {
             const Image image =
-                reconstructDriftKriging(rareLight(spp, p, seed), {.fireflies = Fireflies::Keep}).image;
+                reconstruct(rareLight(spp, p, seed), Drift{.fireflies = Fireflies::Keep}).image;
             EXPECT_GT(least(image, "stddev.R"), 0) << spp << " " << p;
             for (int y = 0; y < 48; ++y)
                 for (int x = 0; x < 48; ++x) {
@@ -108,7 +106,7 @@ TEST(NeverSure, RareLightIsKeptAndCovered) {
 
 TEST(NeverSure, AgreementOfFewSamplesIsNoKnowledge) {
     const SampleBuffer dump = rareLight(4, 0.01, 1);  // 96 % of the pixels are black
-    for (const Image& image : {reconstructDriftKriging(dump, {}).image, reconstructPaper(dump, {}).image})
+    for (const Image& image : {reconstruct(dump, Drift{}).image, reconstruct(dump, Paper{}).image})
         for (const char* channel : {"stddev.R", "stddev.G", "stddev.B"}) EXPECT_GT(least(image, channel), 0);
 }
 
@@ -122,7 +120,7 @@ TEST(NeverSure, ThePaperKnowsThatSamplesAgreeByChance) {
                     const float z = ramp ? 0.02f * static_cast<float>(x + y) : level(random);
                     for (int s = 0; s < spp; ++s) samples.push_back({z, z, 0.3f});
                 });
-            const Image image = reconstructPaper(dump, {}).image;
+            const Image image = reconstruct(dump, Paper{}).image;
             // A pixel's own samples or its region's: sqrt(3 / N / n) of the level, n from spp to N = 16 spp.
             const double most = std::sqrt(3.0 / 16) / spp, smallest = most / 4;
             for (const char* channel : {"stddev.R", "stddev.B"})
@@ -137,22 +135,22 @@ TEST(NeverSure, ThePaperKnowsThatSamplesAgreeByChance) {
 
 // Samples that differ tell their variance: nothing is added.
 TEST(NeverSure, ThePaperTakesWhatSamplesTell) {
-    const Image image = reconstructPaper(greyWith(16, 4, [](int, int) { return true; }), {}).image;
+    const Image image = reconstruct(greyWith(16, 4, [](int, int) { return true; }), Paper{}).image;
     for (int y = 0; y < 16; ++y)
         for (int x = 0; x < 16; ++x) EXPECT_LT(deviation(image, x, y), 0.05 / std::sqrt(4) * 1.5);
 }
 
 TEST(NeverSure, ThePaperIsInDoubtWhereThereAreNoSamples) {
     const auto there = [](int x, int y) { return x >= 8 || y >= 8; };
-    const Reconstruction result = reconstructPaper(greyWith(16, 4, there), {});
-    EXPECT_EQ(result.report.regions[static_cast<std::size_t>(RegionOutcome::Empty)], 4);
+    const Reconstruction result = reconstruct(greyWith(16, 4, there), Paper{});
+    EXPECT_EQ(result.report.paper().outcomes[static_cast<std::size_t>(RegionOutcome::Empty)], 4);
     EXPECT_EQ(result.report.emptyPixels, 64);
     EXPECT_EQ(result.image.at(2, 2)[0], 0);
     EXPECT_GT(deviation(result.image, 2, 2), 0.45);
 }
 
 TEST(NeverSure, ThePlainMeanIsItsSamplesOwnStatistic) {
-    const Image image = reconstructMean(rareLight(4, 0.01, 1)).image;
+    const Image image = reconstruct(rareLight(4, 0.01, 1), Mean{}).image;
     EXPECT_EQ(least(image, "stddev.R"), 0);
     // One of four samples is 1: s^2 = 1/4, over 4.
     bool lit = false;
@@ -169,7 +167,7 @@ TEST(NeverSure, ABlackPictureMayHaveMissedLight) {
     const SampleBuffer dump = picture(20, {"R", "G", "B"}, 1, [](int, int, Random&, auto& samples) {
         samples.push_back({0, 0, 0});
     });
-    for (const Image& image : {reconstructDriftKriging(dump, {}).image, reconstructPaper(dump, {}).image}) {
+    for (const Image& image : {reconstruct(dump, Drift{}).image, reconstruct(dump, Paper{}).image}) {
         EXPECT_EQ(image.at(10, 10)[0], 0);
         EXPECT_GT(least(image, "stddev.R"), 0);
     }
@@ -185,7 +183,7 @@ TEST(NeverSure, TheErrorMapHasNoBorderInTheDark) {
             samples.push_back({z, z / 2, z / 4});
         }
     });
-    const Image image = reconstructDriftKriging(dump, {}).image;
+    const Image image = reconstruct(dump, Drift{}).image;
     for (int colour = 0; colour < 3; ++colour) {
         const auto column = [&](int x) {
             double sum = 0;
@@ -210,8 +208,8 @@ TEST(NeverSure, NoiseFreeAreasStaySharp) {
                 samples.push_back({z, z, z});
             }
         });
-    const Reconstruction result = reconstructDriftKriging(dump, {});
-    EXPECT_EQ(result.report.exactPixels, 0);
+    const Reconstruction result = reconstruct(dump, Drift{});
+    EXPECT_EQ(result.report.drift().exactPixels, 0);
     double squares = 0;
     for (int y = 0; y < 60; ++y)
         for (int x = 0; x < 20; ++x) {
@@ -233,12 +231,12 @@ TEST(NeverSure, OnlyAStatedErrorOfZeroIsExact) {
                        });
     };
     const SampleBuffer exact = flat(0);
-    const Reconstruction kept = reconstructDriftKriging(exact, {.fireflies = Fireflies::Keep});
-    EXPECT_EQ(kept.report.exactPixels, 900);
-    EXPECT_EQ(kept.image.at(7, 7)[0], reconstructMean(exact).image.at(7, 7)[0]);
+    const Reconstruction kept = reconstruct(exact, Drift{.fireflies = Fireflies::Keep});
+    EXPECT_EQ(kept.report.drift().exactPixels, 900);
+    EXPECT_EQ(kept.image.at(7, 7)[0], reconstruct(exact, Mean{}).image.at(7, 7)[0]);
     EXPECT_EQ(deviation(kept.image, 7, 7), 0);
     // Beside pixels that are not, it is an estimate from few samples like any other.
-    const Image beside = reconstructDriftKriging(flat(0.01f), {}).image;
+    const Image beside = reconstruct(flat(0.01f), Drift{}).image;
     EXPECT_EQ(deviation(beside, 5, 5), 0);
     EXPECT_GT(deviation(beside, 14, 5), 0);
 }
@@ -253,14 +251,14 @@ TEST(NeverSure, AHalfWithoutSamplesIsNotBlack) {
     for (const auto& [name, there] : patterns)
         for (const int spp : {1, 2, 4}) {
             const Reconstruction result =
-                reconstructDriftKriging(greyWith(24, spp, there), {.fireflies = Fireflies::Keep});
+                reconstruct(greyWith(24, spp, there), Drift{.fireflies = Fireflies::Keep});
             for (int y = 0; y < 24; ++y)
                 for (int x = 0; x < 24; ++x) {
                     const double error = static_cast<double>(result.image.at(x, y)[0]) - 0.5;
                     EXPECT_LT(std::abs(error), 3 * static_cast<double>(deviation(result.image, x, y)) + 0.02)
                         << name << " " << spp << " at " << x << " " << y;
                 }
-            EXPECT_EQ(result.report.farPixels, 0);
+            EXPECT_EQ(result.report.drift().farPixels, 0);
         }
 }
 
@@ -271,10 +269,10 @@ TEST(NeverSure, WideGapsArePredictedWithAnErrorThatGrows) {
         const auto there = [=](int x, int y) {
             return x < begin || y < begin || x >= begin + hole || y >= begin + hole;
         };
-        const Reconstruction flat = reconstructDriftKriging(greyWith(64, 4, there), {});
-        const Reconstruction waves = reconstructDriftKriging(greyWith(64, 4, there, wave), {});
+        const Reconstruction flat = reconstruct(greyWith(64, 4, there), Drift{});
+        const Reconstruction waves = reconstruct(greyWith(64, 4, there, wave), Drift{});
         EXPECT_EQ(flat.report.emptyPixels, hole * hole);
-        EXPECT_EQ(flat.report.farPixels > 0, hole > 10) << hole;
+        EXPECT_EQ(flat.report.drift().farPixels > 0, hole > 10) << hole;
         for (int y = 0; y < 64; ++y)
             for (int x = 0; x < 64; ++x) {
                 EXPECT_NEAR(flat.image.at(x, y)[0], 0.5, 3 * deviation(flat.image, x, y) + 0.02) << hole;
@@ -284,7 +282,7 @@ TEST(NeverSure, WideGapsArePredictedWithAnErrorThatGrows) {
         EXPECT_GT(deviation(waves.image, 32, 32), 1.5f * deviation(waves.image, begin, 32)) << hole;
         EXPECT_GT(deviation(waves.image, 32, 32), 5 * deviation(waves.image, 5, 5)) << hole;
         // Cut anywhere, the gap is filled the same.
-        const Image band = reconstructDriftKriging(greyWith(64, 4, there, wave), {.band = {1, 2}}).image;
+        const Image band = reconstruct(greyWith(64, 4, there, wave), Drift{.band = {1, 2}}).image;
         EXPECT_TRUE(std::equal(band.pixels.begin(), band.pixels.end(), waves.image.at(0, 32)));
     }
 }
@@ -306,7 +304,7 @@ TEST(NeverSure, NoBorderShowsWhereNeighbourhoodsEndInAGap) {
     const SampleBuffer dump = exponential(
         96, 16, [&](int x, int y) { return !inside(x, y); },
         [](int x, int y) { return 0.5 + 0.004 * x + 0.002 * y; });
-    const Image image = reconstructDriftKriging(dump, {}).image;
+    const Image image = reconstruct(dump, Drift{}).image;
     for (int y = 30; y < 67; ++y)
         for (int x = 30; x < 67; ++x)
             for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}}) {
@@ -321,7 +319,7 @@ TEST(NeverSure, APixelUnlikeAllOthersIsAsUncertainAsItsSamples) {
     const auto lone = [](int x, int y) { return x == 30 && y == 30 ? 50 : 0.2; };
     double square = 0, predicted = 0;
     for (unsigned seed = 1; seed <= 12; ++seed) {
-        const Image image = reconstructDriftKriging(exponential(64, 8, all, lone, seed), {}).image;
+        const Image image = reconstruct(exponential(64, 8, all, lone, seed), Drift{}).image;
         const double error = static_cast<double>(image.at(30, 30)[0]) - 50;
         square += error * error;
         predicted += static_cast<double>(deviation(image, 30, 30)) * deviation(image, 30, 30);
@@ -330,7 +328,7 @@ TEST(NeverSure, APixelUnlikeAllOthersIsAsUncertainAsItsSamples) {
 }
 
 TEST(NeverSure, APictureWithoutSamplesKnowsNothing) {
-    const Image image = reconstructDriftKriging(greyWith(20, 0, [](int, int) { return false; }), {}).image;
+    const Image image = reconstruct(greyWith(20, 0, [](int, int) { return false; }), Drift{}).image;
     for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
     EXPECT_GE(least(image, "stddev.R"), 1);
 }
@@ -340,9 +338,9 @@ TEST(NeverSure, WithoutASecondSampleThereIsNoFirefly) {
         Random random(9);
         std::bernoulli_distribution there(share);
         const Reconstruction result =
-            reconstructDriftKriging(greyWith(48, 1, [&](int, int) { return there(random); }), {});
-        EXPECT_LE(result.report.limitedSamples, 2) << share;
-        EXPECT_LT(result.report.energyRemoved, 0.01) << share;
+            reconstruct(greyWith(48, 1, [&](int, int) { return there(random); }), Drift{});
+        EXPECT_LE(result.report.drift().limitedSamples, 2) << share;
+        EXPECT_LT(result.report.drift().energyRemoved, 0.01) << share;
     }
 }
 
@@ -356,7 +354,7 @@ TEST(NeverSure, SubPixelsWithoutSamplesAreNotBlack) {
                                                                      1.f, static_cast<float>(x) + at(random),
                                                                      static_cast<float>(y) + at(random)});
                                           });
-        const Image image = reconstructDriftKriging(dump, {.scale = scale}).image;
+        const Image image = reconstruct(dump, Drift{.scale = scale}).image;
         EXPECT_GT(least(image, "A"), 0.98) << spp << " " << scale;
         EXPECT_GT(least(image, "G"), 0.49) << spp << " " << scale;
         for (int y = 0; y < image.data.height; ++y)
@@ -383,7 +381,7 @@ double errorWith(const char* feature, float value, const std::function<bool(int,
             samples.back().resize(channels.size(), wild(x, y) ? value : truth(x, y));
         }
     });
-    const Image image = reconstructDriftKriging(dump, {}).image;
+    const Image image = reconstruct(dump, Drift{}).image;
     double squares = 0;
     int count = 0;
     for (int y = 0; y < 48; ++y)
@@ -424,7 +422,7 @@ TEST(NeverSure, RadianceBeyondAllLightCostsItsSamplesOnly) {
                             if (stated) samples.back().resize(6, std::abs(z) > 1 ? std::abs(wild) : 0.0025f);
                         }
                     });
-                const Reconstruction result = reconstructDriftKriging(dump, {.fireflies = fireflies});
+                const Reconstruction result = reconstruct(dump, Drift{.fireflies = fireflies});
                 for (const float value : result.image.pixels) ASSERT_TRUE(std::isfinite(value)) << wild;
                 EXPECT_GT(least(result.image, "stddev.R"), 0) << wild;
                 EXPECT_EQ(result.report.droppedSamples, wild == 1e14f ? 0 : 2) << wild;
@@ -479,7 +477,7 @@ TEST(GapField, IsSmoothAndKnowsHowFarAwaySamplesAre) {
     const SampleBuffer dump = greyWith(
         96, 16, [](int x, int y) { return x < 24 || x >= 72 || y < 24 || y >= 72; }, ramp);
     const SampleLayout layout = chooseSampleLayout(dump, {});
-    const GapField field(dump, layout, GatheredPlanes(layout));
+    const GapField field(dump, layout, GatheredPlanes{layout.radiance, layout.features});
     std::vector<float> values, next;
     EXPECT_NEAR(field.at(8, 8, values), 4, 1e-6);
     EXPECT_NEAR(values[0], ramp(8, 8), 0.02);

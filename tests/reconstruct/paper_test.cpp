@@ -1,5 +1,3 @@
-#include "variolux/reconstruct/paper.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,8 +5,10 @@
 #include <random>
 
 #include "make_band.h"
+#include "reconstruct/paper/krige_region.h"
 #include "variolux/dump/sample_buffer.h"
 #include "variolux/geostat/kriging.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 namespace {
@@ -59,8 +59,8 @@ TEST(ReconstructPaper, CountsWhatMayBeOffByRounding) {
     header.data = header.display = kRegion;
     for (const std::string& channel : band.channels) header.channels.push_back({channel, ChannelType::Float});
     const Reconstruction result =
-        reconstructPaper(SampleBuffer(header, band, "ramp"), {.colourDistance = false});
-    EXPECT_EQ(result.report.inaccuratePixels, 16);
+        reconstruct(SampleBuffer(header, band, "ramp"), Paper{.colourDistance = false});
+    EXPECT_EQ(result.report.paper().inaccuratePixels, 16);
     EXPECT_NE(toText(result.report).find("16 pixels of ill-conditioned systems"), std::string::npos);
     EXPECT_NE(toJson(result.report).find("\"inaccuratePixels\": 16"), std::string::npos);
     const SampleBand noisy = ramp(32, 0.3, 1);
@@ -223,9 +223,9 @@ TEST(KrigeRegion, TakesTheNuggetForNoiseWhereThereIsOneSampleAPixel) {
     EXPECT_LT(squares, 0.5 * 0.09);
 }
 
-TEST(PaperOptions, NameTheBrokenConstraint) {
-    EXPECT_FALSE(PaperOptions{}.validate());
-    EXPECT_TRUE(PaperOptions{.regionSize = -1}.validate());
+TEST(Paper, NameTheBrokenConstraint) {
+    EXPECT_FALSE(Paper{}.validate());
+    EXPECT_TRUE(Paper{.regionSize = -1}.validate());
 }
 
 }  // namespace

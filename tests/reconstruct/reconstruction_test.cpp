@@ -1,5 +1,3 @@
-#include "variolux/reconstruct/reconstruction.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,9 +8,9 @@
 #include "make_band.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
+#include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
-#include "variolux/reconstruct/mean.h"
-#include "variolux/reconstruct/paper.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 namespace {
@@ -46,7 +44,7 @@ TEST(ReconstructPaper, SamePixelsForAnyNumberOfThreads) {
     Image first;
     for (const int threads : {1, 2, 8}) {
         const ThreadLimit limit(threads);
-        const Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
+        const Reconstruction result = reconstruct(DumpReader(folder / "a.exr"), Paper{});
         if (threads == 1) first = result.image;
         EXPECT_EQ(result.image.pixels, first.pixels) << threads;
         EXPECT_EQ(result.image.data, (Window{-3, 5, 38, 27}));
@@ -56,12 +54,12 @@ TEST(ReconstructPaper, SamePixelsForAnyNumberOfThreads) {
 TEST(ReconstructPaper, RegionsLieOnTheRasterGrid) {
     const TemporaryFolder folder;
     writeDump(folder / "a.exr", noisyEdge({-3, 5, 9, 7}, 4));
-    const Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
-    ASSERT_EQ(result.regions.size(), 6u);
-    EXPECT_EQ(result.regions[0].pixels, (Window{-3, 5, 3, 3}));
-    EXPECT_EQ(result.regions[4].pixels, (Window{0, 8, 4, 4}));
+    const Reconstruction result = reconstruct(DumpReader(folder / "a.exr"), Paper{});
+    ASSERT_EQ(result.report.paper().regions.size(), 6u);
+    EXPECT_EQ(result.report.paper().regions[0].pixels, (Window{-3, 5, 3, 3}));
+    EXPECT_EQ(result.report.paper().regions[4].pixels, (Window{0, 8, 4, 4}));
     std::int64_t covered = 0;
-    for (const RegionDiagnostics& region : result.regions) covered += region.pixels.pixels();
+    for (const RegionDiagnostics& region : result.report.paper().regions) covered += region.pixels.pixels();
     EXPECT_EQ(covered, 63);
 }
 
@@ -80,7 +78,8 @@ TEST(ReconstructPaper, BeatsTheMeanOnANoisyEdge) {
             }
         return sum;
     };
-    EXPECT_LT(squareError(reconstructPaper(dump, {}).image), 0.5 * squareError(reconstructMean(dump).image));
+    EXPECT_LT(squareError(reconstruct(dump, Paper{}).image),
+              0.5 * squareError(reconstruct(dump, Mean{}).image));
 }
 
 TEST(ReconstructPaper, NeedsNeitherPositionsNorFeaturesNorAlpha) {
@@ -89,7 +88,7 @@ TEST(ReconstructPaper, NeedsNeitherPositionsNorFeaturesNorAlpha) {
     band.channels.resize(3);
     band.values.resize(3);
     writeDump(folder / "a.exr", band);
-    const Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
+    const Reconstruction result = reconstruct(DumpReader(folder / "a.exr"), Paper{});
     EXPECT_EQ(result.image.channels,
               (std::vector<std::string>{"R", "G", "B", "stddev.R", "stddev.G", "stddev.B"}));
     for (const float value : result.image.pixels) EXPECT_TRUE(std::isfinite(value));
@@ -114,13 +113,16 @@ TEST(ReconstructPaper, BadSamplesAndEmptyPixelsAreCountedAndTheImageStaysFinite)
     }
     writeDump(folder / "a.exr", sparse);
     const DumpReader dump(folder / "a.exr");
-    for (const Reconstruction& result : {reconstructPaper(dump, {}), reconstructMean(dump)}) {
+    for (const Method& method : {Method(Paper{}), Method(Mean{})}) {
+        const Reconstruction result = reconstruct(dump, method);
         EXPECT_EQ(result.report.samples, 96);
         EXPECT_EQ(result.report.droppedSamples, 1);  // the NaN was in a pixel that was emptied
         EXPECT_EQ(result.report.emptyPixels, 16);
         for (const float value : result.image.pixels) EXPECT_TRUE(std::isfinite(value));
     }
-    EXPECT_EQ(reconstructPaper(dump, {}).report.regions[static_cast<std::size_t>(RegionOutcome::Empty)], 1);
+    EXPECT_EQ(
+        reconstruct(dump, Paper{}).report.paper().outcomes[static_cast<std::size_t>(RegionOutcome::Empty)],
+        1);
 }
 
 TEST(ReconstructPaper, WholeImageIsOneRegionForAFewScatteredPoints) {
@@ -141,9 +143,9 @@ TEST(ReconstructPaper, WholeImageIsOneRegionForAFewScatteredPoints) {
     }
     writeDump(folder / "a.exr", band);
     const Reconstruction result =
-        reconstructPaper(DumpReader(folder / "a.exr"), {.regionSize = 0, .colourDistance = false});
-    ASSERT_EQ(result.regions.size(), 1u);
-    EXPECT_EQ(result.regions[0].data, 64);
+        reconstruct(DumpReader(folder / "a.exr"), Paper{.regionSize = 0, .colourDistance = false});
+    ASSERT_EQ(result.report.paper().regions.size(), 1u);
+    EXPECT_EQ(result.report.paper().regions[0].data, 64);
     double worst = 0;
     for (int row = 2; row < 38; ++row)
         for (int col = 2; col < 38; ++col)
@@ -156,7 +158,7 @@ TEST(ReconstructMean, IsTheAverageWithItsStandardError) {
     const TemporaryFolder folder;
     SampleBand band{0, 0, 2, 1, {0, 3, 4}, {"R", "G", "B"}, {{1, 2, 6, 5}, {0, 0, 0, 0}, {1, 1, 1, 1}}};
     writeDump(folder / "a.exr", band);
-    const Image image = reconstructMean(DumpReader(folder / "a.exr")).image;
+    const Image image = reconstruct(DumpReader(folder / "a.exr"), Mean{}).image;
     EXPECT_FLOAT_EQ(image.at(0, 0)[0], 3);
     EXPECT_FLOAT_EQ(image.at(0, 0)[3], std::sqrt(7.0f / 3));  // s^2 = 7
     EXPECT_FLOAT_EQ(image.at(1, 0)[0], 5);
@@ -166,14 +168,14 @@ TEST(ReconstructMean, IsTheAverageWithItsStandardError) {
 TEST(Report, IsJsonWithEveryRegion) {
     const TemporaryFolder folder;
     writeDump(folder / "a.exr", noisyEdge({0, 0, 8, 4}, 4));
-    Reconstruction result = reconstructPaper(DumpReader(folder / "a.exr"), {});
+    Reconstruction result = reconstruct(DumpReader(folder / "a.exr"), Paper{});
     const auto document = nlohmann::json::parse(toJson(result));
     EXPECT_EQ(document["regions"].size(), 2u);
     EXPECT_EQ(document["report"]["samples"], 128);
     addDiagnosticLayers(result);
     const int layer = result.image.channel("diagnostics.range");
     ASSERT_GE(layer, 0);
-    EXPECT_FLOAT_EQ(result.image.at(5, 2)[layer], static_cast<float>(result.regions[1].range));
+    EXPECT_FLOAT_EQ(result.image.at(5, 2)[layer], static_cast<float>(result.report.paper().regions[1].range));
     EXPECT_GE(result.image.channel("stddev.B"), 0);
 }
 

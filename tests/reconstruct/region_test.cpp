@@ -1,4 +1,4 @@
-#include "variolux/reconstruct/region.h"
+#include "reconstruct/common/region.h"
 
 #include <gtest/gtest.h>
 

@@ -4,9 +4,9 @@
 
 #include "../base/temporary_folder.h"
 #include "reconstruct/common/rebin.h"
+#include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
-#include "variolux/reconstruct/drift_kriging.h"
-#include "variolux/reconstruct/mean.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 namespace {
@@ -50,7 +50,7 @@ TEST(ReplicatesThatShareLight, TheErrorMapHoldsTheVarianceOfSplats) {
     writer.close();
 
     const DumpReader dump(folder / "a.exr");
-    const Reconstruction mean = reconstructMean(dump);
+    const Reconstruction mean = reconstruct(dump, Mean{});
     double variance = 0, squares = 0;
     for (int p = 0; p < kSide * kSide; ++p) {
         const float* v = mean.image.at(p % kSide, p / kSide);
@@ -70,8 +70,8 @@ TEST(ReplicatesThatShareLight, TheErrorMapHoldsTheVarianceOfSplats) {
     DumpWriter independent(folder / "b.exr", header);
     independent.write(averageReplicates(dump.read(0, kSide, {"R", "G", "B", "sample.replicate"}), 3));
     independent.close();
-    const Reconstruction shared = reconstructDriftKriging(dump, {});
-    const Reconstruction plain = reconstructDriftKriging(DumpReader(folder / "b.exr"), {});
+    const Reconstruction shared = reconstruct(dump, Drift{});
+    const Reconstruction plain = reconstruct(DumpReader(folder / "b.exr"), Drift{});
     for (int p = 0; p < kSide * kSide; ++p)
         for (int c = 0; c < 6; ++c)
             ASSERT_EQ(shared.image.at(p % kSide, p / kSide)[c], plain.image.at(p % kSide, p / kSide)[c]);

@@ -10,9 +10,7 @@
 #include "variolux/base/error.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
-#include "variolux/reconstruct/drift_kriging.h"
-#include "variolux/reconstruct/mean.h"
-#include "variolux/reconstruct/paper.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 namespace {
@@ -62,10 +60,9 @@ TEST(SampleBuffer, GivesTheBitsOfTheWayThroughAFile) {
     writer.close();
     const DumpReader dump(folder / "a.exr");
     const SampleBuffer buffer(all.header, all.band);
-    EXPECT_EQ(reconstructDriftKriging(buffer, {}).image.pixels,
-              reconstructDriftKriging(dump, {}).image.pixels);
-    EXPECT_EQ(reconstructMean(buffer).image.pixels, reconstructMean(dump).image.pixels);
-    EXPECT_EQ(reconstructPaper(buffer, {}).image.pixels, reconstructPaper(dump, {}).image.pixels);
+    EXPECT_EQ(reconstruct(buffer, Drift{}).image.pixels, reconstruct(dump, Drift{}).image.pixels);
+    EXPECT_EQ(reconstruct(buffer, Mean{}).image.pixels, reconstruct(dump, Mean{}).image.pixels);
+    EXPECT_EQ(reconstruct(buffer, Paper{}).image.pixels, reconstruct(dump, Paper{}).image.pixels);
 }
 
 TEST(SampleBuffer, WhatAProgressThrowsEndsTheReconstruction) {
@@ -73,11 +70,11 @@ TEST(SampleBuffer, WhatAProgressThrowsEndsTheReconstruction) {
     const SampleBuffer buffer(all.header, all.band);
     struct Cancelled {};
     int calls = 0;
-    EXPECT_THROW(reconstructDriftKriging(buffer, {.quality = Quality::Draft},
-                                         [&](std::int64_t, std::int64_t) {
-                                             ++calls;
-                                             throw Cancelled();
-                                         }),
+    EXPECT_THROW(reconstruct(buffer, Drift{.quality = Quality::Draft},
+                             [&](std::int64_t, std::int64_t) {
+                                 ++calls;
+                                 throw Cancelled();
+                             }),
                  Cancelled);
     EXPECT_EQ(calls, 1);
 }

@@ -31,15 +31,15 @@ struct VarianceTest : testing::Test {
         squares.row(5, y)[x] = static_cast<float>(all * all);
     }
     double variance(const RowRing* of, int plane = 0) {
-        RowRing out(kSide, kVariancePlanes, kSide), features(kSide, 0, kSide);
+        RowRing out(kSide, VariancePlanes::kChannels, kSide), features(kSide, 0, kSide);
         smoothVariances(squares, data, kData, features, 0, picture, of, kHere, kSide, kSide, out);
         return static_cast<double>(out.row(plane, kHere)[kHere]);
     }
     double unseen(double level) const { return unseenVariance(kWindow * kSamples, level); }
 
     PictureScale picture;
-    RowRing data{kSide, kData.channels(), kSide}, squares{kSide, kSquaresPlanes, kSide},
-        wide{kSide / 2, kVariancePlanes, kSide / 2};
+    RowRing data{kSide, kData.channels(), kSide}, squares{kSide, SquaresPlanes::kChannels, kSide},
+        wide{kSide / 2, VariancePlanes::kChannels, kSide / 2};
 };
 
 TEST_F(VarianceTest, IsThatOfTheWindowAndOfWhatItDidNotSee) {
@@ -57,7 +57,7 @@ TEST_F(VarianceTest, WhatOnePixelMetIsRare) {
 
 TEST_F(VarianceTest, AgreeingSamplesAboveThePicturesLevelMissedWhatIsAsBright) {
     EXPECT_NEAR(variance(nullptr), unseen(1), 1e-9);
-    for (int c = 0; c < 3; ++c) set(data, kData.meanA() + c, 4);
+    for (int c = 0; c < 3; ++c) set(data, kData.mean(0) + c, 4);
     EXPECT_NEAR(variance(nullptr), unseen(4), 1e-9);
     set(data, kData.stated(), 1);
     EXPECT_EQ(variance(nullptr), 0);

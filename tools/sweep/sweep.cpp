@@ -172,13 +172,14 @@ class Runner {
         } else {
             const Json report = reportOf(run, record.command);
             const double trace = report.at("traceSeconds"), write = report.at("writeCpuSeconds");
+            const double rays = report.at("traceCpuSeconds");
             const double pixels = report.at("width").get<double>() * report.at("height").get<double>();
             record.samplesPerPixel = report.at("samples").get<double>() / pixels;
             record.seconds = run.seconds;
             record.cpuSeconds = run.cpuSeconds();
             record.peakBytes = run.peakBytes;
-            // Writing goes on beside tracing: of the wall time it gets its share of the processors.
-            const double written = std::min(trace, write / report.at("threads").get<double>());
+            // Writing goes on beside tracing: of the wall time it gets its share of the processor's.
+            const double written = trace * write / std::max(write + rays, 1e-9);
             record.stages = {{"trace", trace - written},
                              {"write dump", written},
                              {"load scene", std::max(0.0, run.seconds - trace)}};

@@ -5,8 +5,8 @@
 #include <limits>
 
 #include "variolux/base/error.h"
-#include "variolux/compare/gaussian.h"
 #include "variolux/compare/metrics.h"
+#include "variolux/reconstruct/gaussian.h"
 
 namespace vlx {
 

@@ -34,6 +34,19 @@ struct Image {
         return -1;
     }
 
+    /// The image of some of its channels, in the order of `names`, all of which it has.
+    Image select(const std::vector<std::string>& names) const {
+        Image result(data, names);
+        result.display = display;
+        std::vector<int> from;
+        for (const std::string& name : names) from.push_back(channel(name));
+        const std::size_t count = channels.size();
+        auto out = result.pixels.begin();
+        for (std::size_t p = 0; p < pixels.size(); p += count)
+            for (const int c : from) *out++ = pixels[p + static_cast<std::size_t>(c)];
+        return result;
+    }
+
     /// The channels of column `col`, row `row`, counted from the data window's corner.
     float* at(int col, int row) { return pixels.data() + offset(col, row); }
     const float* at(int col, int row) const { return pixels.data() + offset(col, row); }

@@ -10,6 +10,10 @@ namespace vlx {
 /// Results must not depend on that order: each task writes only what it owns.
 void parallelFor(std::int64_t begin, std::int64_t end, const std::function<void(std::int64_t)>& body);
 
+/// Ends the threads that parallelFor() works with, and waits for them; the next call starts others. At the
+/// end of a program: one that is just being started then would be torn down half-made.
+void endThreads();
+
 /// While it lives, at most `threads` threads work (0: all processors). Made once, in main.
 class ThreadLimit {
   public:

@@ -14,10 +14,11 @@ namespace vlx {
 ///     vlx::SampleBand samples;                       // band.h: one array a channel, pixel by pixel
 ///     ...
 ///     const vlx::SampleBuffer buffer(header, std::move(samples));
-///     const vlx::Reconstruction image = vlx::reconstructDriftKriging(buffer, {.quality =
-///     vlx::Quality::Draft},
-///         [&](std::int64_t done, std::int64_t total) { if (restarted) throw Cancelled(); show(done, total);
-///         });
+///     const vlx::Progress shown = [&](std::int64_t done, std::int64_t total) {
+///         if (restarted) throw Cancelled();
+///         show(done, total);
+///     };
+///     const vlx::Reconstruction image = vlx::reconstruct(buffer, vlx::Drift{}, shown);
 ///
 /// What a Progress throws ends the reconstruction and comes out of it. FORMAT.md says which
 /// channels there are and what they mean. Values are rounded to their channels' types, so that the result has

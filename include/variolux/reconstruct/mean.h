@@ -1,9 +1,5 @@
 #pragma once
 
-#include "variolux/base/progress.h"
-#include "variolux/dump/reader.h"
-#include "variolux/reconstruct/reconstruction.h"
-
 namespace vlx {
 
 /// The plain average of each pixel's samples (a box filter of one pixel): what every renderer writes, and
@@ -12,7 +8,9 @@ namespace vlx {
 /// raster (their pooled variance, or else the variance between them). It is the samples' own statistic: 0
 /// where they agree, whatever they have not seen, where the other methods stay in doubt. A pixel without
 /// samples is `empty`, with the picture's spread about 0 as its error, and counted. Non-finite samples are
-/// dropped and counted. Throws as SampleSource::read.
-Reconstruction reconstructMean(const SampleSource& dump, const Progress& progress = {}, float empty = 0);
+/// dropped and counted.
+struct Mean {
+    float empty = 0;
+};
 
 }  // namespace vlx

@@ -5,22 +5,22 @@
 #include <utility>
 #include <vector>
 
-#include "variolux/base/progress.h"
-#include "variolux/dump/reader.h"
-#include "variolux/reconstruct/reconstruction.h"
-#include "variolux/reconstruct/region.h"
-
 /// Yue and Nishita's method (METHOD.md sections 4 to 6): ordinary kriging of sub-pixel cell means with known
 /// measurement errors, in regions of 4 x 4 pixels, on a composite distance.
 namespace vlx {
 
-struct PaperOptions {
+/// The method's options. No pixel is sure of itself: where not two of a region's N samples differ, one
+/// sample's variance is taken to be that of what they may not have seen, 3 / N times the square of the
+/// pixel's level or the picture's mean (drift.h, 9); it changes the errors, not the estimates. A region
+/// without samples is 0, with the picture's spread about 0 as its error. reconstruct() throws Error when a
+/// region holds more than kMaxRegionData cells.
+struct Paper {
     /// Side of the square regions in pixels, on a raster grid through (0, 0); 0: the whole image is one
     /// region.
     int regionSize = 4;
     /// Join the distance in colour space with the distance on the image plane.
     bool colourDistance = true;
-    /// Raster coordinates (x, y) of pixels whose regions are to be inspected (Reconstruction::inspections).
+    /// Raster coordinates (x, y) of pixels whose regions are to be inspected (PaperReport::inspections).
     std::vector<std::pair<int, int>> inspect = {};
 
     /// The broken constraint in words, or nothing.
@@ -29,53 +29,5 @@ struct PaperOptions {
 
 /// Most data that one kriging system may hold (its matrix is then 128 MB).
 inline constexpr int kMaxRegionData = 4096;
-
-/// The estimates of one region.
-struct RegionEstimate {
-    Eigen::MatrixXd values;  ///< pixels x c, row by row from the region's top left
-    Eigen::MatrixXd stddev;  ///< pixels x c: standard deviation of the error, as far as the data tell
-    /// pixels x 3: sum of w_i^2 / n_i, w the data's weights and n their counts, over the data whose samples
-    /// do not differ (within the rounding of half floats) or, where no pixel holds two, whose noise by the
-    /// nugget is below unseenVariance(): what one sample's variance, which they do not tell, adds.
-    Eigen::MatrixXd agreed;
-    RegionDiagnostics diagnostics;
-    RegionInspection inspection;  ///< only when asked for
-};
-
-/// Krige one region. The first three columns of `data.means` are R, G, B; they carry the variogram; further
-/// columns are estimated with the same weights.
-///
-/// 1. Dissimilarity of two data (section 4): half the squared norm of their RGB difference, less the mean of
-///    their error variances s^2/n: what noise adds is known and taken off, not fitted.
-/// 2. A stable model gamma(h) = c0 + c (1 - exp(-(h/r)^alpha)) is fitted to it in classes of
-///    distance on the image plane.
-/// 3. Composite distance (section 6): h^2 = dx^2 + dy^2 + k^2 |dz|^2 with dz the difference of two RGB
-///    estimates, each taken from the region's arithmetic mean m. A datum's estimate is its mean; a target's
-///    is its pixel's arithmetic mean, drawn towards m by how much of it is noise: m + (pixel mean - m) S /
-///    (S + e), with S the variance between the region's data less their errors, e the error variance of the
-///    pixel mean. k makes one standard deviation of the region's data as long as one pixel, times the share
-///    of their variance that is no noise, S / variance: noise alone does not make neighbours distant; a
-///    singular value, many deviations away from all others, loses its weight.
-/// 4. The system (11), in covariance form (the errors with a plus on the diagonal of the covariances), is
-///    factorised once; a pixel's estimate is the mean over its cells of the kriged field (a block target).
-///    The nugget is variation between cells that is no noise: a pixel contains that of its own cells.
-///
-/// Where no pixel holds two samples their errors are unknown: the fitted nugget is then taken for noise,
-/// except with the whole image as region, whose samples count as exact (the paper's figure 1).
-///
-/// A region that cannot be kriged gets its mean; `diagnostics.outcome` says why. Pixels whose solution is
-/// less accurate than geostat's tolerance are counted. Never throws for numerical reasons; every value
-/// returned is finite. With `inspect`, `inspection` tells everything behind the estimate, which is not
-/// changed by that.
-RegionEstimate krigeRegion(const RegionData& data, const PaperOptions& options, bool inspect = false);
-
-/// The method over a whole dump, region by region. No pixel is sure of itself: where not two of a region's N
-/// samples differ, one sample's variance is taken to be that of what they may not have seen, 3 / N times the
-/// square of the pixel's level or the picture's mean (drift_kriging.h, 9); it changes the errors, not the
-/// estimates. A region without samples is 0, with the picture's spread about 0 as its error. Deterministic
-/// for any number of threads. Throws as SampleSource::read; Error when options are invalid or a region holds
-/// more than kMaxRegionData cells.
-Reconstruction reconstructPaper(const SampleSource& dump, const PaperOptions& options,
-                                const Progress& progress = {});
 
 }  // namespace vlx

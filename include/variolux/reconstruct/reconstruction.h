@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "variolux/base/image.h"
@@ -45,28 +46,42 @@ struct RegionDiagnostics {
     int inaccurate = 0;  ///< pixels whose kriging is less accurate than asked (TargetStatus::Inaccurate)
 };
 
-/// What a run did, for people and machines.
-struct ReconstructionReport {
-    std::array<std::int64_t, kRegionOutcomes> regions{};  ///< count by RegionOutcome
-    std::int64_t samples = 0;                             ///< samples read
-    std::int64_t droppedSamples = 0;                      ///< non-finite radiance: left out
-    std::int64_t emptyPixels = 0;                         ///< pixels without a usable sample of their own
-    std::int64_t jitteredSystems = 0;                     ///< kriging systems that needed jitter
-    std::int64_t inaccuratePixels = 0;      ///< of regions: rounding may show (TargetStatus::Inaccurate)
-    std::int64_t farPixels = 0;             ///< of them, with none within 5 pixels either
+/// What the paper's method did.
+struct PaperReport {
+    std::array<std::int64_t, kRegionOutcomes> outcomes{};  ///< count by RegionOutcome
+    std::int64_t jitteredSystems = 0;                      ///< kriging systems that needed jitter
+    std::int64_t inaccuratePixels = 0;                     ///< rounding may show (TargetStatus::Inaccurate)
+    std::vector<RegionDiagnostics> regions;                ///< row by row
+    std::map<std::size_t, RegionInspection> inspections;   ///< of regions (by index) where it was asked for
+};
+
+/// What the default method did.
+struct DriftReport {
+    std::int64_t farPixels = 0;             ///< empty, and with no samples within 5 pixels either
     std::int64_t exactPixels = 0;           ///< the dump states an error of 0: kept as they are
     std::int64_t limitedSamples = 0;        ///< made darker by the firefly estimator
     double energyRemoved = 0;               ///< share of all samples' luminance that this took away
     double energyReturned = 0;              ///< and that was given back around them
-    std::int64_t neighbourhoods = 0;        ///< kriged (default method), over models and halves
+    std::int64_t neighbourhoods = 0;        ///< kriged, over models and halves
     std::int64_t ownNeighbourhoods = 0;     ///< centred on pixels unlike their regular centres
     std::int64_t failedNeighbourhoods = 0;  ///< not solvable: their weighted mean
     std::int64_t driftFeatures = 0;         ///< sum over neighbourhoods of the features that vary there; the
                                             ///< others are no drift
     double driftFunctions = 0;              ///< sum over neighbourhoods of the effective number of functions
-    std::map<std::string, double> seconds;  ///< wall time by stage (default method)
-    double readSeconds = 0;                 ///< wall time in the reader
-    double solveSeconds = 0;                ///< wall time of everything else
+    std::map<std::string, double> seconds;  ///< wall time by stage
+};
+
+/// What a run did, for people and machines.
+struct ReconstructionReport {
+    std::int64_t samples = 0;         ///< samples read
+    std::int64_t droppedSamples = 0;  ///< non-finite radiance: left out
+    std::int64_t emptyPixels = 0;     ///< pixels without a usable sample of their own
+    double readSeconds = 0;           ///< wall time in the reader
+    double solveSeconds = 0;          ///< wall time of everything else
+    std::variant<std::monostate, PaperReport, DriftReport> method;  ///< of those that have more to say
+
+    const PaperReport& paper() const { return std::get<PaperReport>(method); }
+    const DriftReport& drift() const { return std::get<DriftReport>(method); }
 };
 
 /// A reconstructed image with what there is to know about it.
@@ -74,19 +89,17 @@ struct Reconstruction {
     /// R, G, B, A when the dump has it, stddev.R, stddev.G, stddev.B: the standard deviation of the
     /// estimate's error; with diagnostics, layers diagnostics.* follow.
     Image image;
-    std::vector<RegionDiagnostics> regions;               ///< row by row; empty for methods without regions
-    std::map<std::size_t, RegionInspection> inspections;  ///< of regions (by index) where it was asked for
     ReconstructionReport report;
 };
 
 std::string toText(const ReconstructionReport& report);
 std::string toJson(const ReconstructionReport& report);
 
-/// The report and, when there are any, all regions: what `vlx-krige --diagnostics` writes beside the image.
+/// Of the paper's method: the report and all regions, what `vlx-krige --diagnostics` writes beside the image.
 std::string toJson(const Reconstruction& reconstruction);
 
-/// Appends the layers diagnostics.nugget, .sill, .range, .exponent, .errorVariance, .outcome to the image,
-/// constant over each region.
+/// Of the paper's method: appends the layers diagnostics.nugget, .sill, .range, .exponent, .errorVariance,
+/// .outcome to the image, constant over each region.
 void addDiagnosticLayers(Reconstruction& reconstruction);
 
 }  // namespace vlx

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "reconstruct/common/methods.h"
 #include "reconstruct/common/rebin.h"
 #include "variolux/base/memory.h"
 
@@ -46,20 +47,11 @@ ChannelChoice chooseChannels(const DumpHeader& header) {
     return choice;
 }
 
-Image makeOutputImage(const SampleSource& dump, const ChannelChoice& channels) {
-    std::vector<std::string> names(channels.names.begin(), channels.names.begin() + channels.radianceCount());
-    for (const char* channel : {"stddev.R", "stddev.G", "stddev.B"}) names.emplace_back(channel);
-    const DumpHeader& header = dump.header();
-    requireMemory(dump.path(), imageBytes(header.data, names.size()),
-                  "an image held whole (--method krige with --filter box holds rows)");
-    Image image(header.data, std::move(names));
-    image.display = header.display;
-    return image;
-}
-
 void forEachBand(const SampleSource& reader, const ChannelChoice& channels, int step,
-                 ReconstructionReport& report, const Progress& progress,
-                 const std::function<void(const SampleBand&)>& body) {
+                 ReconstructionReport& report, const RowSink& sink, const Progress& progress,
+                 const std::function<void(const SampleBand&, Image& rows)>& body) {
+    std::vector<std::string> names(channels.names.begin(), channels.names.begin() + channels.radianceCount());
+    names.insert(names.end(), std::begin(kStddevChannels), std::end(kStddevChannels));
     const Window& window = reader.header().data;
     const int end = window.y + window.height;
     for (int y = window.y; y < end;) {
@@ -71,7 +63,11 @@ void forEachBand(const SampleSource& reader, const ChannelChoice& channels, int 
         const double readTime = secondsSince(start);
         report.readSeconds += readTime;
         report.samples += static_cast<std::int64_t>(band.samples());
-        body(band);
+        const Window rowsWindow{band.x, band.y, band.width, band.height};
+        requireMemory(reader.path(), imageBytes(rowsWindow, names.size()), "rows as wide as these");
+        Image image(rowsWindow, names);
+        body(band, image);
+        sink(image.pixels.data(), band.height);
         report.solveSeconds += secondsSince(start) - readTime;
         y = next;
         if (progress) progress(y - window.y, window.height);

@@ -4,10 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "reconstruct/common/region.h"
+#include "variolux/base/image.h"
 #include "variolux/base/progress.h"
 #include "variolux/dump/sample_source.h"
-#include "variolux/reconstruct/reconstruction.h"
-#include "variolux/reconstruct/region.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 
@@ -21,18 +22,16 @@ struct ChannelChoice {
 /// R, G, B, then A and the sample positions where the dump has them.
 ChannelChoice chooseChannels(const DumpHeader& header);
 
-/// An image of the dump's windows with R, G, B (A) and stddev.R, stddev.G, stddev.B. Throws Error when there
-/// is not the memory for it.
-Image makeOutputImage(const SampleSource& dump, const ChannelChoice& channels);
-
 /// The least multiple of `step` greater than `a`, which may be negative: windows may start anywhere.
 int nextMultiple(int a, int step);
 
 /// Reads the dump in bands of rows that start at multiples of `step` in raster coordinates (the first and the
-/// last may be shorter), step rows or a few times that, or all at once where step is 0, and calls body(band).
-/// Adds what reading took to report.readSeconds and the samples to report.samples.
+/// last may be shorter), step rows or a few times that, or all at once where step is 0, calls body(band,
+/// rows) and gives the rows, an image of the radiance channels and the layers stddev, to `sink`. Adds what
+/// reading took to report.readSeconds and the samples to report.samples. Throws Error when there is not the
+/// memory for a band.
 void forEachBand(const SampleSource& reader, const ChannelChoice& channels, int step,
-                 ReconstructionReport& report, const Progress& progress,
-                 const std::function<void(const SampleBand&)>& body);
+                 ReconstructionReport& report, const RowSink& sink, const Progress& progress,
+                 const std::function<void(const SampleBand&, Image& rows)>& body);
 
 }  // namespace vlx

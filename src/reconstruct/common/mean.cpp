@@ -1,10 +1,9 @@
-#include "variolux/reconstruct/mean.h"
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 
 #include "reconstruct/common/bands.h"
+#include "reconstruct/common/methods.h"
 #include "reconstruct/common/picture_scale.h"
 #include "variolux/base/parallel.h"
 
@@ -32,42 +31,44 @@ Eigen::VectorXd borrowedVariance(const SampleBand& band, const BandLayout& layou
 
 }  // namespace
 
-Reconstruction reconstructMean(const SampleSource& dump, const Progress& progress, float emptyValue) {
+ReconstructionReport reconstructMean(const SampleSource& dump, const Mean& method, const RowSink& sink,
+                                     const Progress& progress) {
     ChannelChoice channels = chooseChannels(dump.header());
     channels.names.resize(channels.layout.radiance.size());  // positions are not needed
     channels.layout.x = channels.layout.y = -1;
     const int radiance = channels.radianceCount();
 
     const PictureScale picture = measurePictureScale(dump);
-    Reconstruction result;
-    result.image = makeOutputImage(dump, channels);
+    ReconstructionReport report;
     std::atomic<std::int64_t> dropped = 0, empty = 0;
-    forEachBand(dump, channels, kNeighbourhood, result.report, progress, [&](const SampleBand& band) {
+    const auto average = [&](const SampleBand& band, Image& rows) {
         parallelFor(0, band.height, [&](std::int64_t line) {
-            const int row = band.y + static_cast<int>(line);
-            for (int column = band.x; column < band.x + band.width; ++column) {
-                const RegionData pixel = gatherRegion(band, channels.layout, Window{column, row, 1, 1}, 1);
+            const int row = static_cast<int>(line);
+            for (int col = 0; col < band.width; ++col) {
+                const RegionData pixel =
+                    gatherRegion(band, channels.layout, Window{band.x + col, band.y + row, 1, 1}, 1);
                 dropped += pixel.dropped;
-                float* out = result.image.at(column - result.image.data.x, row - result.image.data.y);
+                float* out = rows.at(col, row);
                 if (pixel.samples == 0) {
                     ++empty;
-                    std::fill_n(out, radiance, emptyValue);
+                    std::fill_n(out, radiance, method.empty);
                     for (int c = 0; c < 3; ++c)
                         out[radiance + c] = static_cast<float>(picture.unknownDeviation(c));
                     continue;
                 }
                 const Eigen::VectorXd variance =
                     pixel.varianceKnown ? Eigen::VectorXd(pixel.errorVariances.row(0) * pixel.counts[0])
-                                        : borrowedVariance(band, channels.layout, column, row);
+                                        : borrowedVariance(band, channels.layout, band.x + col, band.y + row);
                 for (int c = 0; c < radiance; ++c) out[c] = static_cast<float>(pixel.means(0, c));
                 for (int c = 0; c < 3; ++c)
                     out[radiance + c] = static_cast<float>(std::sqrt(variance[c] / pixel.counts[0]));
             }
         });
-    });
-    result.report.droppedSamples = dropped;
-    result.report.emptyPixels = empty;
-    return result;
+    };
+    forEachBand(dump, channels, kNeighbourhood, report, sink, progress, average);
+    report.droppedSamples = dropped;
+    report.emptyPixels = empty;
+    return report;
 }
 
 }  // namespace vlx

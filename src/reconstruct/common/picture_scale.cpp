@@ -24,22 +24,22 @@ class Sums {
     void add(const RowRing& row, const GatheredPlanes& planes, int width) {
         const auto at = [&](int plane, int x) { return static_cast<double>(row.row(plane, 0)[x]); };
         const auto half = [&](int h, int c, int x) {  // a half without samples has the other's mean
-            const bool own = at(h == 0 ? planes.countA : planes.countB, x) > 0;
-            return at(((h == 0) == own ? planes.meanA : planes.meanB) + c, x);
+            const bool own = at(planes.halfCount(h), x) > 0;
+            return at(planes.mean(own ? h : 1 - h) + c, x);
         };
         for (int x = 0; x < width; ++x) {
-            const double n = at(planes.count, x);
+            const double n = at(planes.count(), x);
             if (n == 0) continue;
             samples_ += n;
-            freedom_ += at(planes.freedom, x);
+            freedom_ += at(planes.freedom(), x);
             for (int c = 0; c < 3; ++c) {
-                radiance_[c] += at(planes.countA, x) * at(planes.meanA + c, x) +
-                                at(planes.countB, x) * at(planes.meanB + c, x);
-                if (at(planes.freedom, x) > 0) squares_[c] += at(planes.squares + c, x);
+                radiance_[c] += at(planes.halfCount(0), x) * at(planes.mean(0) + c, x) +
+                                at(planes.halfCount(1), x) * at(planes.mean(1) + c, x);
+                if (at(planes.freedom(), x) > 0) squares_[c] += at(planes.squares() + c, x);
             }
             for (std::size_t k = 0; k < lags_.size(); ++k) {
                 const int to = x + lags_[k];
-                if (to >= width || at(planes.count, to) == 0) continue;
+                if (to >= width || at(planes.count(), to) == 0) continue;
                 ++pairs_[k];
                 for (int c = 0; c < 3; ++c)
                     products_[c][k] +=
@@ -109,8 +109,8 @@ PictureScale measurePictureScale(const SampleSource& dump) {
 
 PictureScale measurePictureScale(const SampleSource& dump, const SampleLayout& layout) {
     const DumpHeader& header = dump.header();
-    const GatheredPlanes planes(layout);
-    RowRing ring(header.data.width, planes.channels, 1);
+    const GatheredPlanes planes{layout.radiance, layout.features};
+    RowRing ring(header.data.width, planes.channels(), 1);
     const auto sumsOf = [&](int rows) {
         Sums sums(header.data.width);
         for (int i = 0; i < rows; ++i) {

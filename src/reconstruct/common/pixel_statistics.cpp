@@ -114,7 +114,7 @@ double knownSquares(const SampleBand& band, const SampleLayout& layout,
 
 }  // namespace
 
-std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options) {
+std::vector<std::string> furtherRadiance(const DumpHeader& header, const Drift& options) {
     std::vector<std::string> names, further;
     for (const DumpChannel& channel : header.channels) names.push_back(channel.name);
     for (const std::string& wanted : options.radiance) {
@@ -125,7 +125,7 @@ std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKr
     return further;
 }
 
-SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOptions& options) {
+SampleLayout chooseSampleLayout(const SampleSource& dump, const Drift& options) {
     const DumpHeader& header = dump.header();
     SampleLayout layout;
     layout.names = {"R", "G", "B"};
@@ -166,31 +166,6 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOpti
         layout.names.insert(layout.names.end(), std::begin(kVarianceChannels), std::end(kVarianceChannels));
     }
     return layout;
-}
-
-GatheredPlanes::GatheredPlanes(const SampleLayout& layout)
-    : radiance(layout.radiance), features(layout.features) {
-    int next = 0;
-    const auto take = [&](int planes) {
-        const int first = next;
-        next += planes;
-        return first;
-    };
-    count = take(1);
-    countA = take(1);
-    countB = take(1);
-    meanA = take(radiance);
-    meanB = take(radiance);
-    squares = take(3);
-    freedom = take(1);
-    stated = take(1);
-    feature = take(features);
-    featureError = take(features);
-    brightest = take(radiance);
-    brightestLuminance = take(1);
-    secondLuminance = take(1);
-    brightestHalf = take(1);
-    channels = next;
 }
 
 float saturated(float value) {
@@ -281,31 +256,31 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         const auto put = [&](int plane, double v) { ring.row(plane, y)[x] = static_cast<float>(v); };
         const auto nA = static_cast<double>(halves[0].size());
         const auto nB = static_cast<double>(halves[1].size());
-        put(planes.count, n);
-        put(planes.countA, nA);
-        put(planes.countB, nB);
-        put(planes.stated, known);
-        put(planes.freedom, known ? std::max(1.0, n - 1) : std::max(0.0, n - 1));
+        put(planes.count(), n);
+        put(planes.halfCount(0), nA);
+        put(planes.halfCount(1), nB);
+        put(planes.stated(), known);
+        put(planes.freedom(), known ? std::max(1.0, n - 1) : std::max(0.0, n - 1));
         for (std::size_t c = 0; c < radiance; ++c) {
             const double a = nA > 0 ? first[c] + sum[0][c] / nA : 0;
-            put(planes.meanA + static_cast<int>(c), a);
-            put(planes.meanB + static_cast<int>(c), nB > 0 ? first[c] + sum[1][c] / nB : 0);
+            put(planes.mean(0) + static_cast<int>(c), a);
+            put(planes.mean(1) + static_cast<int>(c), nB > 0 ? first[c] + sum[1][c] / nB : 0);
         }
         for (std::size_t c = 0; c < radiance + features; ++c) {
             const double total = sum[0][c] + sum[1][c];
             double squares = n > 0 ? std::max(0.0, square[c] - total * total / n) : 0;
             if (c < 3 && known) squares = knownSquares(band, layout, taken, c);
-            if (c < 3) put(planes.squares + static_cast<int>(c), squares);
+            if (c < 3) put(planes.squares() + static_cast<int>(c), squares);
             if (c < radiance) continue;
             const int f = static_cast<int>(c - radiance);
-            put(planes.feature + f, n > 0 ? first[c] + total / n : 0);
-            put(planes.featureError + f, n > 1 ? squares / (n * (n - 1)) : 0);
+            put(planes.feature() + f, n > 0 ? first[c] + total / n : 0);
+            put(planes.featureError() + f, n > 1 ? squares / (n * (n - 1)) : 0);
         }
         for (std::size_t c = 0; c < radiance; ++c)
-            put(planes.brightest + static_cast<int>(c), taken.empty() ? 0 : value(c, bright));
-        put(planes.brightestLuminance, std::max(0.f, most));
-        put(planes.secondLuminance, std::max(0.f, second));
-        put(planes.brightestHalf, brightHalf);
+            put(planes.brightest() + static_cast<int>(c), taken.empty() ? 0 : value(c, bright));
+        put(planes.brightestLuminance(), std::max(0.f, most));
+        put(planes.secondLuminance(), std::max(0.f, second));
+        put(planes.brightestHalf(), brightHalf);
     }
     return counts;
 }

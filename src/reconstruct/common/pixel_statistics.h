@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "reconstruct/common/row_ring.h"
+#include "reconstruct/common/planes.h"
 #include "variolux/dump/band.h"
 #include "variolux/dump/format.h"
 #include "variolux/dump/sample_source.h"
-#include "variolux/reconstruct/drift_kriging.h"
+#include "variolux/reconstruct/drift.h"
 
 /// What the default method knows of a pixel: moments of its samples, gathered in one pass over the dump.
 namespace vlx {
@@ -34,32 +34,14 @@ inline float luminance(const double* rgb) {
 }
 
 /// The channels that options.radiance stands for.
-std::vector<std::string> furtherRadiance(const DumpHeader& header, const DriftKrigingOptions& options);
+std::vector<std::string> furtherRadiance(const DumpHeader& header, const Drift& options);
 
 /// Finds the roles. Albedo and normals are of order 1 by definition; the scale of depth and of named features
 /// is the 99th percentile of their magnitude, at most 4 medians (a background's depth has no bounds), in 16
 /// rows spread over the image (the same rows whatever band of the image is reconstructed). Features that are
 /// constant in these rows stay: they cost little. Throws Error when a named channel is missing or is R, G or
 /// B.
-SampleLayout chooseSampleLayout(const SampleSource& dump, const DriftKrigingOptions& options);
-
-/// Planes of the statistics of rows of pixels, as gathered.
-struct GatheredPlanes {
-    explicit GatheredPlanes(const SampleLayout& layout);
-
-    int radiance, features;
-    // Indices of planes.
-    int count;                  ///< usable samples
-    int countA, countB;         ///< of each half
-    int meanA, meanB;           ///< radiance channels: mean of each half (0 where it has no sample)
-    int squares;                ///< 3: sum of squared deviations of R, G, B from the pixel's mean
-    int freedom;                ///< degrees of freedom of `squares`
-    int stated;                 ///< 1 where the dump states the error variances of all samples, else 0
-    int feature, featureError;  ///< mean of each feature, and the error variance of that mean
-    int brightest;              ///< radiance channels of the brightest sample
-    int brightestLuminance, secondLuminance, brightestHalf;
-    int channels;
-};
+SampleLayout chooseSampleLayout(const SampleSource& dump, const Drift& options);
 
 /// What a feature's value counts as, in units of its scale: itself up to 1, and beyond that 1 + ln |x|. A
 /// lamp's albedo of 100 or a sky at depth 1e10 is unlike all else, no more.

@@ -1,5 +1,6 @@
 #include "variolux/reconstruct/reconstruction.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -10,35 +11,43 @@ namespace vlx {
 
 namespace {
 
-double perNeighbourhood(const ReconstructionReport& report, double sum) {
+double perNeighbourhood(const DriftReport& report, double sum) {
     return report.neighbourhoods > 0 ? sum / static_cast<double>(report.neighbourhoods) : 0;
 }
 
-nlohmann::ordered_json json(const ReconstructionReport& report) {
+nlohmann::ordered_json json(const PaperReport& report) {
     nlohmann::ordered_json regions = nlohmann::ordered_json::object();
     for (int i = 0; i < kRegionOutcomes; ++i)
         regions[std::string(name(static_cast<RegionOutcome>(i)))] =
-            report.regions[static_cast<std::size_t>(i)];
-    nlohmann::ordered_json document = {
-        {"samples", report.samples},
-        {"droppedSamples", report.droppedSamples},
-        {"limitedSamples", report.limitedSamples},
-        {"energyRemoved", report.energyRemoved},
-        {"energyReturned", report.energyReturned},
-        {"emptyPixels", report.emptyPixels},
-        {"farPixels", report.farPixels},
-        {"exactPixels", report.exactPixels},
-        {"regions", regions},
-        {"jitteredSystems", report.jitteredSystems},
-        {"inaccuratePixels", report.inaccuratePixels},
-        {"neighbourhoods", report.neighbourhoods},
-        {"ownNeighbourhoods", report.ownNeighbourhoods},
-        {"failedNeighbourhoods", report.failedNeighbourhoods},
-        {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
-        {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
-        {"readSeconds", report.readSeconds},
-        {"solveSeconds", report.solveSeconds}};
-    if (!report.seconds.empty()) document["seconds"] = report.seconds;
+            report.outcomes[static_cast<std::size_t>(i)];
+    return {{"regions", regions},
+            {"jitteredSystems", report.jitteredSystems},
+            {"inaccuratePixels", report.inaccuratePixels}};
+}
+
+nlohmann::ordered_json json(const DriftReport& report) {
+    return {{"limitedSamples", report.limitedSamples},
+            {"energyRemoved", report.energyRemoved},
+            {"energyReturned", report.energyReturned},
+            {"farPixels", report.farPixels},
+            {"exactPixels", report.exactPixels},
+            {"neighbourhoods", report.neighbourhoods},
+            {"ownNeighbourhoods", report.ownNeighbourhoods},
+            {"failedNeighbourhoods", report.failedNeighbourhoods},
+            {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
+            {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
+            {"seconds", report.seconds}};
+}
+
+nlohmann::ordered_json json(std::monostate) { return nlohmann::ordered_json::object(); }
+
+nlohmann::ordered_json json(const ReconstructionReport& report) {
+    nlohmann::ordered_json document = {{"samples", report.samples},
+                                       {"droppedSamples", report.droppedSamples},
+                                       {"emptyPixels", report.emptyPixels},
+                                       {"readSeconds", report.readSeconds},
+                                       {"solveSeconds", report.solveSeconds}};
+    document.update(std::visit([](const auto& of) { return json(of); }, report.method));
     return document;
 }
 
@@ -112,6 +121,40 @@ nlohmann::ordered_json json(const RegionInspection& inspection) {
     return document;
 }
 
+std::string inWords(const PaperReport& report) {
+    std::ostringstream text;
+    bool first = true;
+    for (int i = 0; i < kRegionOutcomes; ++i) {
+        const std::int64_t count = report.outcomes[static_cast<std::size_t>(i)];
+        if (count == 0) continue;
+        text << (first ? "regions: " : ", ") << count << " " << name(static_cast<RegionOutcome>(i));
+        first = false;
+    }
+    if (!first) text << "\n";
+    if (report.jitteredSystems > 0) text << report.jitteredSystems << " systems needed jitter\n";
+    if (report.inaccuratePixels > 0)
+        text << report.inaccuratePixels << " pixels of ill-conditioned systems may be off by rounding\n";
+    return text.str();
+}
+
+std::string inWords(const DriftReport& report) {
+    constexpr double kMuchLight = 0.1;
+    std::ostringstream text;
+    text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
+         << " % of the light removed, " << 100 * report.energyReturned << " % given back"
+         << (report.energyRemoved - report.energyReturned > kMuchLight
+                 ? " (WARNING: much; where few samples find the light, --fireflies keep keeps it)\n"
+                 : "\n")
+         << report.neighbourhoods << " neighbourhoods kriged, "
+         << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
+         << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
+    if (report.failedNeighbourhoods > 0)
+        text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
+    return text.str();
+}
+
+std::string inWords(std::monostate) { return {}; }
+
 }  // namespace
 
 std::string_view name(RegionOutcome outcome) {
@@ -134,43 +177,19 @@ std::string_view name(RegionOutcome outcome) {
     return "";
 }
 
-constexpr double kMuchLight = 0.1;
-
 std::string toText(const ReconstructionReport& report) {
+    const DriftReport* drift = std::get_if<DriftReport>(&report.method);
     std::ostringstream text;
     text << report.samples << " samples";
     if (report.droppedSamples > 0)
         text << ", " << report.droppedSamples
-             << (report.neighbourhoods > 0 ? " dropped (non-finite, or beyond 10^15)"
-                                           : " dropped (non-finite)");
+             << (drift ? " dropped (non-finite, or beyond 10^15)" : " dropped (non-finite)");
     if (report.emptyPixels > 0) text << ", " << report.emptyPixels << " pixels without samples";
-    if (report.farPixels > 0) text << " (" << report.farPixels << " of them more than 5 pixels from any)";
-    if (report.exactPixels > 0) text << ", " << report.exactPixels << " pixels kept: their stated error is 0";
-    text << "\n";
-    bool first = true;
-    for (int i = 0; i < kRegionOutcomes; ++i) {
-        const std::int64_t count = report.regions[static_cast<std::size_t>(i)];
-        if (count == 0) continue;
-        text << (first ? "regions: " : ", ") << count << " " << name(static_cast<RegionOutcome>(i));
-        first = false;
-    }
-    if (!first) text << "\n";
-    if (report.limitedSamples > 0 || report.neighbourhoods > 0)
-        text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
-             << " % of the light removed, " << 100 * report.energyReturned << " % given back"
-             << (report.energyRemoved - report.energyReturned > kMuchLight
-                     ? " (WARNING: much; where few samples find the light, "
-                       "--fireflies keep keeps it)\n"
-                     : "\n");
-    if (report.neighbourhoods > 0)
-        text << report.neighbourhoods << " neighbourhoods kriged, "
-             << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
-             << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
-    if (report.failedNeighbourhoods > 0)
-        text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
-    if (report.jitteredSystems > 0) text << report.jitteredSystems << " systems needed jitter\n";
-    if (report.inaccuratePixels > 0)
-        text << report.inaccuratePixels << " pixels of ill-conditioned systems may be off by rounding\n";
+    if (drift && drift->farPixels > 0)
+        text << " (" << drift->farPixels << " of them more than 5 pixels from any)";
+    if (drift && drift->exactPixels > 0)
+        text << ", " << drift->exactPixels << " pixels kept: their stated error is 0";
+    text << "\n" << std::visit([](const auto& of) { return inWords(of); }, report.method);
     return text.str();
 }
 
@@ -179,8 +198,9 @@ std::string toJson(const ReconstructionReport& report) { return json(report).dum
 std::string toJson(const Reconstruction& reconstruction) {
     nlohmann::ordered_json document = {{"report", json(reconstruction.report)}};
     auto& regions = document["regions"] = nlohmann::ordered_json::array();
-    for (std::size_t i = 0; i < reconstruction.regions.size(); ++i) {
-        const RegionDiagnostics& r = reconstruction.regions[i];
+    const PaperReport& paper = reconstruction.report.paper();
+    for (std::size_t i = 0; i < paper.regions.size(); ++i) {
+        const RegionDiagnostics& r = paper.regions[i];
         regions.push_back({{"x", r.pixels.x},
                            {"y", r.pixels.y},
                            {"width", r.pixels.width},
@@ -197,7 +217,7 @@ std::string toJson(const Reconstruction& reconstruction) {
                            {"condition", r.condition},
                            {"jitter", r.jitter},
                            {"inaccurate", r.inaccurate}});
-        if (const auto found = reconstruction.inspections.find(i); found != reconstruction.inspections.end())
+        if (const auto found = paper.inspections.find(i); found != paper.inspections.end())
             regions.back()["inspection"] = json(found->second);
     }
     return document.dump(1);
@@ -213,7 +233,7 @@ void addDiagnosticLayers(Reconstruction& reconstruction) {
     for (int row = 0; row < image.data.height; ++row)
         for (int col = 0; col < image.data.width; ++col)
             std::copy_n(old.at(col, row), old.channelCount(), image.at(col, row));
-    for (const RegionDiagnostics& r : reconstruction.regions)
+    for (const RegionDiagnostics& r : reconstruction.report.paper().regions)
         for (int row = r.pixels.y; row < r.pixels.y + r.pixels.height; ++row)
             for (int col = r.pixels.x; col < r.pixels.x + r.pixels.width; ++col) {
                 float* values = image.at(col - image.data.x, row - image.data.y) + old.channelCount();

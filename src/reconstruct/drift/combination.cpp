@@ -36,7 +36,7 @@ double Combination::unit(int x, int y) const {
 }
 
 void Combination::momentsRow(int y) {
-    const int m = candidates(), planes = momentPlanes(m);
+    const int m = candidates(), planes = MomentPlanes{m}.channels();
     std::vector<double> sums(static_cast<std::size_t>(planes)), e(static_cast<std::size_t>(m + 1)),
         squares(static_cast<std::size_t>(m));
     for (int x = 0; x < width_; ++x) {
@@ -64,7 +64,7 @@ void Combination::momentsRow(int y) {
                 }
             }
         for (int j = 0; j < m; ++j)
-            sums[sums.size() - static_cast<std::size_t>(m - j)] =
+            sums[static_cast<std::size_t>(MomentPlanes{m}.variance() + j)] =
                 squares[static_cast<std::size_t>(j)] * squares[static_cast<std::size_t>(j)];
         for (int k = 0; k < planes; ++k)
             moments_.row(k, y)[x] = static_cast<float>(sums[static_cast<std::size_t>(k)]);
@@ -72,7 +72,7 @@ void Combination::momentsRow(int y) {
 }
 
 void Combination::combineRow(int y) {
-    const int m = candidates(), planes = momentPlanes(m);
+    const int m = candidates(), planes = MomentPlanes{m}.channels();
     const auto w = static_cast<std::size_t>(width_);
     // Moments averaged under a triangular window, first over rows.
     std::vector<double> columns(w * static_cast<std::size_t>(planes));

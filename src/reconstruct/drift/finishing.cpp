@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "reconstruct/common/wide.h"
+#include "base/simd.h"
 #include "reconstruct/drift/prefilter.h"
 #include "reconstruct/drift/stacking.h"
 
@@ -130,7 +130,7 @@ void Finishing::cleanRow(int y) {
 
 void Finishing::lightRow(int y) {
     const auto w = static_cast<std::size_t>(width_);
-    std::vector<double> in(kLightPlanes * w);
+    std::vector<double> in(LightPlanes::kChannels * w);
     for (std::size_t i = 0; i < w; ++i)
         for (std::size_t c = 0; c < 3; ++c) {
             const double lost = data_.row(planes_.removed() + static_cast<int>(c), y)[i];
@@ -138,7 +138,7 @@ void Finishing::lightRow(int y) {
             in[3 * w + i] += lost * lost;
             in[(4 + c) * w + i] = std::max(0.f, clean_.row(static_cast<int>(c), y)[i]);
         }
-    for (int k = 0; k < kLightPlanes; ++k)
+    for (int k = 0; k < LightPlanes::kChannels; ++k)
         for (int x = 0; x < width_; ++x) {
             double sum = 0;
             for (int col = std::max(0, x - kLightReach); col <= std::min(width_ - 1, x + kLightReach);
@@ -157,10 +157,10 @@ void Finishing::lightRow(int y) {
 /// r^2, as a share of the light's square.
 std::vector<double> Finishing::returned(int y) const {
     const auto w = static_cast<std::size_t>(width_);
-    std::vector<double> sums(kLightPlanes * w), shares(5 * w);
+    std::vector<double> sums(LightPlanes::kChannels * w), shares(5 * w);
     for (int row = std::max(0, y - kLightReach); row <= std::min(height_ - 1, y + kLightReach); ++row) {
         const double weight = lightWeight(row - y);
-        for (int k = 0; k < kLightPlanes; ++k) {
+        for (int k = 0; k < LightPlanes::kChannels; ++k) {
             const float* in = light_.row(k, row);
             double* sum = sums.data() + static_cast<std::size_t>(k) * w;
             for (std::size_t i = 0; i < w; ++i) sum[i] += (k == 3 ? weight * weight : weight) * in[i];
@@ -196,7 +196,8 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
         const double gap = data_.row(planes_.gap(), y)[x];
         const double strength = n > 0 ? strength_ : 1;
         const double leverage = combined_.row(combinedPlanes_.leverage(), y)[x];
-        const bool twoHalves = data_.row(planes_.countA(), y)[x] > 0 && data_.row(planes_.countB(), y)[x] > 0;
+        const bool twoHalves =
+            data_.row(planes_.halfCount(0), y)[x] > 0 && data_.row(planes_.halfCount(1), y)[x] > 0;
         double back[3] = {};
         for (int c = 0; c < radiance_; ++c) {
             const double mean = plainMean(data_, planes_, c, x, y);
@@ -225,8 +226,8 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             // A pixel's own scatter beyond two standard deviations raises its variance, by as much as the
             // pixel itself is in its estimate.
             if (twoHalves) {
-                const double apart = static_cast<double>(data_.row(planes_.meanA() + c, y)[x]) -
-                                     static_cast<double>(data_.row(planes_.meanB() + c, y)[x]);
+                const double apart = static_cast<double>(data_.row(planes_.mean(0) + c, y)[x]) -
+                                     static_cast<double>(data_.row(planes_.mean(1) + c, y)[x]);
                 variance += leverage * leverage * std::max(0.0, apart * apart / 4 - 4 * meanVariance);
             }
             out[radiance_ + c] = static_cast<float>(
@@ -250,9 +251,10 @@ float Finishing::likeness(int x, int y, int col, int row) const {
     float d = 0;
     for (int f = 0; f < layout_.features; ++f) {
         const float apart = features_.row(f, row)[col] - features_.row(f, y)[x];
-        d += apart * apart / (kAlikeFeatures2 + 2 * features_.row(layout_.features + f, y)[x]);
+        d += apart * apart /
+             (kAlikeFeatures2 + 2 * features_.row(FeaturePlanes{layout_.features}.error(f), y)[x]);
     }
-    return nearExp(d);
+    return simd::nearExp(d);
 }
 
 /// Variance of R, G, B of the mean of the two halves' estimates, from their difference, over the pixels of

@@ -4,10 +4,9 @@
 #include <vector>
 
 #include "reconstruct/common/picture_scale.h"
-#include "reconstruct/common/row_ring.h"
 #include "reconstruct/drift/level.h"
 
-/// From the combined estimate to the picture and its error: drift_kriging.h, 7 to 9.
+/// From the combined estimate to the picture and its error: drift.h, 7 to 9.
 namespace vlx {
 
 /// Refers to its level and rings. Rows may be worked on at the same time.
@@ -18,12 +17,9 @@ class Finishing {
     static constexpr int kAlikeReach = 2;  ///< of the error map: 5 x 5 pixels
 
     /// `combined`: CombinedPlanes, instead of the level's own; `clean`: radiance channels; `light`:
-    /// kLightPlanes.
+    /// LightPlanes.
     Finishing(const SampleLayout& layout, double strength, int scale, const PictureScale& picture,
               const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light);
-
-    /// Planes of `light`: what fireflies lost of R, G, B; the square of it; R, G, B.
-    static constexpr int kLightPlanes = 7;
 
     /// Row y of `clean`: a pixel beyond the range of its eight neighbours moves towards them, by what its own
     /// noise explains of how far: shrinkage(beyond^2, h^2 sum over colours of v / n), h its leverage and v

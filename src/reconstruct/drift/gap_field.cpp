@@ -48,21 +48,21 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
     const int width = header.data.width, height = header.data.height, distance = values_ - 1;
     std::vector<Level> levels;
     levels.push_back(makeLevel((width + kBlock - 1) / kBlock, (height + kBlock - 1) / kBlock, values_));
-    RowRing ring(width, planes.channels, 1);
+    RowRing ring(width, planes.channels(), 1);
     SampleBand band;
     for (int y = 0; y < height; ++y) {
         if (y % kBlock == 0) band = readRows(dump, layout, 1, y, std::min(kBlock, height - y));
         gatherRow(band, layout, planes, y % kBlock, 0, ring, 0);
         for (int x = 0; x < width; ++x) {
             const auto of = [&](int plane) { return ring.row(plane, 0)[x]; };
-            if (of(planes.count) == 0) continue;
+            if (of(planes.count()) == 0) continue;
             float* sums = levels[0].at(x / kBlock, y / kBlock, values_);
             ++levels[0].weight(x / kBlock, y / kBlock);
             for (int c = 0; c < layout.radiance; ++c)
-                sums[c] +=
-                    (of(planes.countA) * of(planes.meanA + c) + of(planes.countB) * of(planes.meanB + c)) /
-                    of(planes.count);
-            for (int f = 0; f < layout.features; ++f) sums[layout.radiance + f] += of(planes.feature + f);
+                sums[c] += (of(planes.halfCount(0)) * of(planes.mean(0) + c) +
+                            of(planes.halfCount(1)) * of(planes.mean(1) + c)) /
+                           of(planes.count());
+            for (int f = 0; f < layout.features; ++f) sums[layout.radiance + f] += of(planes.feature() + f);
         }
     }
     // Pull: a block of the next scale is the mean of its four, each counting no more than a full one. What

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "reconstruct/common/wide.h"
+#include "base/simd.h"
 
 namespace vlx {
 

@@ -57,7 +57,7 @@ void halveRow(const PixelRows& fine, int width, int height, int radiance, int fe
         put(coarse.data, planes.count(), count);
         put(coarse.data, planes.stated(), stated);
         put(coarse.data, planes.gap(), gap / 2);
-        for (int k = 0; k < kSquaresPlanes; ++k) {
+        for (int k = 0; k < SquaresPlanes::kChannels; ++k) {
             double sum = 0;
             forParts(width, height, x, y,
                      [&](int col, int row) { sum += static_cast<double>(fine.squares.row(k, row)[col]); });
@@ -104,7 +104,7 @@ void Correction::differenceRow(int y) {
             variance += 2 * static_cast<double>(fine_.variances.row(c, y)[x]) / n / 3;
             for (int half = 0; half < 2; ++half) {
                 const double k = fine_.combined.row(planes_.half(half) + c, y)[x];
-                const double d = differences_.row(planes_.half(half) + c, y)[x];
+                const double d = differences_.row(apart_.half(half) + c, y)[x];
                 top = std::max({top, k * k, (k + d) * (k + d)});
                 if (fine_.data.row(data.halfCount(1 - half), y)[x] == 0) continue;
                 gain += d * (static_cast<double>(fine_.data.row(data.mean(1 - half) + c, y)[x]) - k);
@@ -112,8 +112,8 @@ void Correction::differenceRow(int y) {
             }
         }
         const double unit = 1 / (variance + 1e-8 * top + 1e-300);
-        differences_.row(this->gain(), y)[x] = static_cast<float>(gain * unit);
-        differences_.row(this->square(), y)[x] = static_cast<float>(square * unit);
+        differences_.row(apart_.gain(), y)[x] = static_cast<float>(gain * unit);
+        differences_.row(apart_.square(), y)[x] = static_cast<float>(square * unit);
     }
 }
 
@@ -124,8 +124,8 @@ void Correction::correctRow(int y) {
     for (int row = std::max(0, y - kReach); row <= std::min(height - 1, y + kReach); ++row)
         for (int x = 0; x < width; ++x) {
             const auto i = static_cast<std::size_t>(x);
-            gains[i] += side(row - y) * static_cast<double>(differences_.row(gain(), row)[x]);
-            squares[i] += side(row - y) * static_cast<double>(differences_.row(square(), row)[x]);
+            gains[i] += side(row - y) * static_cast<double>(differences_.row(apart_.gain(), row)[x]);
+            squares[i] += side(row - y) * static_cast<double>(differences_.row(apart_.square(), row)[x]);
         }
     for (int x = 0; x < width; ++x) {
         double gain = 0, square = 0;
@@ -138,7 +138,7 @@ void Correction::correctRow(int y) {
             corrected_.row(k, y)[x] = static_cast<float>(fine_.combined.row(k, y)[x] +
                                                          w * static_cast<double>(differences_.row(k, y)[x]));
         for (int c = 0; c < 3; ++c) {
-            const double d = differences_.row(planes_.value() + c, y)[x];
+            const double d = differences_.row(apart_.value() + c, y)[x];
             const double ofFine = fine_.combined.row(planes_.variance() + c, y)[x];
             const double ofCoarse =
                 std::min<double>(ofFine, coarse_.combined.row(planes_.variance() + c, y / 2)[x / 2]);

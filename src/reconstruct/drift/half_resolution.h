@@ -1,10 +1,9 @@
 #pragma once
 
-#include "reconstruct/common/row_ring.h"
 #include "reconstruct/drift/combination.h"
 #include "reconstruct/drift/level.h"
 
-/// The picture kriged once more at half its resolution, and the two combined: drift_kriging.h, 6.
+/// The picture kriged once more at half its resolution, and the two combined: drift.h, 6.
 namespace vlx {
 
 /// A picture less wide or high is kriged at its own resolution only.
@@ -26,11 +25,15 @@ class Correction {
 
     Correction(int radiance, const LevelRows& fine, const LevelRows& coarse, RowRing& differences,
                RowRing& corrected)
-        : planes_{radiance}, fine_(fine), coarse_(coarse), differences_(differences), corrected_(corrected) {}
+        : planes_{radiance},
+          apart_{radiance},
+          fine_(fine),
+          coarse_(coarse),
+          differences_(differences),
+          corrected_(corrected) {}
 
-    static int differencePlanes(int radiance) { return radiance + 8; }
-    /// Row y of `differences`: combined rows from y - 3 to y + 3 of the fine level, and from y / 2 - 1 to
-    /// y / 2 + 1 of the coarse one, are there.
+    /// Row y of `differences` (DifferencePlanes): combined rows from y - 3 to y + 3 of the fine level, and
+    /// from y / 2 - 1 to y / 2 + 1 of the coarse one, are there.
     void differenceRow(int y);
     /// Row y of `corrected` (CombinedPlanes): K + w (L - K), w the weight in 0 to 1 by which each half's
     /// correction predicts the other half's data best,
@@ -44,10 +47,8 @@ class Correction {
     void correctRow(int y);
 
   private:
-    int gain() const { return planes_.radiance + 6; }
-    int square() const { return planes_.radiance + 7; }
-
     CombinedPlanes planes_;
+    DifferencePlanes apart_;
     LevelRows fine_, coarse_;
     RowRing &differences_, &corrected_;
 };

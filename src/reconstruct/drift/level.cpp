@@ -23,8 +23,7 @@ constexpr int kCombinedRows = 96;
 }  // namespace
 
 Level::Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models, int width, int height,
-             int ahead, const PictureScale& picture, Source source, ReconstructionReport& report,
-             StageClock& clock)
+             int ahead, const PictureScale& picture, Source source, DriftReport& report, StageClock& clock)
     : layout_(layout),
       models_(std::move(models)),
       width_(width),
@@ -35,11 +34,11 @@ Level::Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models,
       report_(report),
       clock_(clock),
       pixels_{RowRing(width, DataPlanes{radiance_}.channels(), kept(kDataRows + ahead)),
-              RowRing(width, kSquaresPlanes, kept(kRawRows + ahead)),
-              RowRing(width, 2 * layout.features, kept(kRawRows + ahead))},
-      features_(width, 2 * layout.features, kept(kFeatureRows)),
-      variances_(width, kVariancePlanes, kept(kFeatureRows)),
-      moments_(width, Combination::momentPlanes(static_cast<int>(models_.size())), kept(kEstimateRows)),
+              RowRing(width, SquaresPlanes::kChannels, kept(kRawRows + ahead)),
+              RowRing(width, FeaturePlanes{layout.features}.channels(), kept(kRawRows + ahead))},
+      features_(width, FeaturePlanes{layout.features}.channels(), kept(kFeatureRows)),
+      variances_(width, VariancePlanes::kChannels, kept(kFeatureRows)),
+      moments_(width, MomentPlanes{static_cast<int>(models_.size())}.channels(), kept(kEstimateRows)),
       combined_(width, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
       combination_(radiance_, width, height, pixels_.data, variances_, estimates_, moments_, combined_) {
     for (std::size_t m = 0; m < models_.size(); ++m) {

@@ -6,21 +6,21 @@
 
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/pixel_statistics.h"
-#include "reconstruct/common/row_ring.h"
 #include "reconstruct/common/stage_clock.h"
 #include "reconstruct/drift/combination.h"
 #include "reconstruct/drift/neighbourhoods.h"
 #include "reconstruct/drift/pixel_data.h"
+#include "variolux/reconstruct/reconstruction.h"
 
-/// The picture at one resolution, from its data to the combination of its models: drift_kriging.h, 2 to 5.
+/// The picture at one resolution, from its data to the combination of its models: drift.h, 2 to 5.
 namespace vlx {
 
 /// What a level holds when it is combined.
 struct LevelRows {
     int width, height;
     const RowRing& data;       ///< DataPlanes
-    const RowRing& features;   ///< prefilter.h
-    const RowRing& variances;  ///< of one sample of R, G, B
+    const RowRing& features;   ///< FeaturePlanes
+    const RowRing& variances;  ///< VariancePlanes
     const RowRing& combined;   ///< CombinedPlanes
 };
 
@@ -33,8 +33,7 @@ class Level {
     /// `ahead`: rows that the source may fill beyond what this level asks for. The last model is the small
     /// one, which the first is shrunk towards.
     Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models, int width, int height,
-          int ahead, const PictureScale& picture, Source source, ReconstructionReport& report,
-          StageClock& clock);
+          int ahead, const PictureScale& picture, Source source, DriftReport& report, StageClock& clock);
     Level(const Level&) = delete;
     Level& operator=(const Level&) = delete;
 
@@ -66,7 +65,7 @@ class Level {
     int width_, height_, radiance_;
     const PictureScale& picture_;
     Source source_;
-    ReconstructionReport& report_;
+    DriftReport& report_;
     StageClock& clock_;
     PixelRows pixels_;
     RowRing features_, variances_;

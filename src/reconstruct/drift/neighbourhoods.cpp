@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "reconstruct/common/wide.h"
+#include "base/simd.h"
 #include "reconstruct/drift/gram.h"
 #include "reconstruct/drift/wild_values.h"
 #include "variolux/geostat/random_drift.h"
@@ -141,7 +141,7 @@ class Tile {
             for (const int dx : {-left, model.stride - left}) {
                 if (x_ + col + dx >= in_.width || y_ + row + dy >= in_.height) continue;
                 const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
-                if (nearExp(compositeDistance(model, half, col, row, dx, dy)) > kCoveringWeight &&
+                if (simd::nearExp(compositeDistance(model, half, col, row, dx, dy)) > kCoveringWeight &&
                     errors_[half][here] >= kCoveringVariance * errors_[half][there])
                     return true;
             }
@@ -166,7 +166,7 @@ class Tile {
         for (int dy = std::max(-reach, -(y_ + row)); dy <= std::min(reach, in_.height - 1 - y_ - row); ++dy)
             for (int dx = std::max(-reach, -(x_ + col)); dx <= std::min(reach, in_.width - 1 - x_ - col);
                  ++dx) {
-                const float alike = nearExp(compositeDistance(model, half, col, row, dx, dy));
+                const float alike = simd::nearExp(compositeDistance(model, half, col, row, dx, dy));
                 if (alike < kLeastWeight) continue;
                 const int at = inner(col + dx, row + dy);
                 const float ratio = std::clamp(counts_[half][static_cast<std::size_t>(at)] / own,

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "reconstruct/common/row_ring.h"
 #include "reconstruct/drift/patch_similarity.h"
 #include "reconstruct/drift/pixel_data.h"
 
@@ -11,7 +10,7 @@
 /// reach.
 namespace vlx {
 
-/// How far a neighbourhood reaches and how unlike its patches may be (drift_kriging.h, 3 and 5).
+/// How far a neighbourhood reaches and how unlike its patches may be (drift.h, 3 and 5).
 struct NeighbourhoodModel {
     int reach = 8;          ///< pixels along each axis, at most kMaxReach
     float tolerance = 1;    ///< k of w = exp(-d / k^2)
@@ -19,30 +18,10 @@ struct NeighbourhoodModel {
     bool features = false;  ///< unlike features weigh a datum down as well
 };
 
-/// Sums over neighbourhoods, of one model; planes of one half begin at half * perHalf().
-struct EstimatePlanes {
-    int radiance = 3;
-    int weight() const { return 0; }
-    int sum(int channel) const { return 1 + channel; }              ///< of weight * (estimate - reference)
-    int square(int colour) const { return 1 + radiance + colour; }  ///< of weight * (estimate - reference)^2
-    int variance() const { return 1 + radiance + 3; }               ///< of weight * kriging variance
-    /// Of weight * what the pixel's datum weighs in its own estimate, the diagonal of the hat matrix.
-    int leverage() const { return 1 + radiance + 4; }
-    int perHalf() const { return 1 + radiance + 5; }
-    int channels() const { return 2 * perHalf(); }
-};
-
-/// A pixel's reference value, which sums are taken about so that little cancels: the smaller of its halves'
-/// means (a firefly is in one of them).
-inline float reference(const RowRing& data, const DataPlanes& planes, int channel, int x, int y) {
-    const float a = data.row(planes.meanA() + channel, y)[x], b = data.row(planes.meanB() + channel, y)[x];
-    return a < b ? a : b;
-}
-
 struct TileInput {
     const RowRing* data = nullptr;       ///< DataPlanes
-    const RowRing* features = nullptr;   ///< f features, then their f error variances
-    const RowRing* variances = nullptr;  ///< 3: variance of one sample of R, G, B
+    const RowRing* features = nullptr;   ///< FeaturePlanes
+    const RowRing* variances = nullptr;  ///< VariancePlanes
     DataPlanes planes;
     int featureCount = 0;
     std::vector<int> group;  ///< of each feature

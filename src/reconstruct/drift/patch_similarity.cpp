@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "reconstruct/common/wide.h"
+#include "base/simd.h"
 
 namespace vlx {
 

@@ -26,7 +26,7 @@ void PixelData::prepare(int first, int until) {
     parallelFor(first, until, [&](std::int64_t line) {
         const int y = static_cast<int>(line);
         for (int x = 0; x < width_ && !far[static_cast<std::size_t>(y - first)]; ++x)
-            if (gathered_.row(planes_.count, y)[x] == 0 && nearest(planes_.count, x, y).x < 0)
+            if (gathered_.row(planes_.count(), y)[x] == 0 && nearest(planes_.count(), x, y).x < 0)
                 far[static_cast<std::size_t>(y - first)] = 1;
     });
     if (std::find(far.begin(), far.end(), 1) != far.end())
@@ -36,12 +36,12 @@ void PixelData::prepare(int first, int until) {
 LimitedRow PixelData::fillRow(int y) {
     LimitedRow row;
     for (int x = 0; x < width_; ++x) {
-        const bool hole = gathered_.row(planes_.count, y)[x] == 0;
+        const bool hole = gathered_.row(planes_.count(), y)[x] == 0;
         out_.data.row(dataPlanes_.gap(), y)[x] = hole ? fillHole(x, y, row) : 0;
         limitPixel(x, y, row);
     }
     for (int k = 0; k < 2 * layout_.features; ++k)
-        std::copy_n(gathered_.row(planes_.feature + k, y), width_, out_.raw.row(k, y));
+        std::copy_n(gathered_.row(planes_.feature() + k, y), width_, out_.raw.row(k, y));
     return row;
 }
 
@@ -62,18 +62,18 @@ PixelData::Place PixelData::nearest(int count, int x, int y) const {
 /// A pixel without samples gets the means and features of the nearest one that has some, so that it is alike
 /// to what is around it. Its counts stay 0: it is predicted, but is no datum. How far away that was.
 float PixelData::fillHole(int x, int y, LimitedRow& row) {
-    const Place from = nearest(planes_.count, x, y);
+    const Place from = nearest(planes_.count(), x, y);
     if (from.x >= 0) {
-        const float n = gathered_.row(planes_.count, from.y)[from.x];
-        const float nA = gathered_.row(planes_.countA, from.y)[from.x];
+        const float n = gathered_.row(planes_.count(), from.y)[from.x];
+        const float nA = gathered_.row(planes_.halfCount(0), from.y)[from.x];
         for (int c = 0; c < radiance_; ++c) {
-            const float a = gathered_.row(planes_.meanA + c, from.y)[from.x];
-            const float b = gathered_.row(planes_.meanB + c, from.y)[from.x];
+            const float a = gathered_.row(planes_.mean(0) + c, from.y)[from.x];
+            const float b = gathered_.row(planes_.mean(1) + c, from.y)[from.x];
             const float mean = (nA * a + (n - nA) * b) / n;
-            gathered_.row(planes_.meanA + c, y)[x] = nA > 0 ? a : mean;
-            gathered_.row(planes_.meanB + c, y)[x] = n > nA ? b : mean;
+            gathered_.row(planes_.mean(0) + c, y)[x] = nA > 0 ? a : mean;
+            gathered_.row(planes_.mean(1) + c, y)[x] = n > nA ? b : mean;
         }
-        for (int k = planes_.feature; k < planes_.feature + 2 * layout_.features; ++k)
+        for (int k = planes_.feature(); k < planes_.feature() + 2 * layout_.features; ++k)
             gathered_.row(k, y)[x] = gathered_.row(k, from.y)[from.x];
         return from.distance;
     }
@@ -81,39 +81,39 @@ float PixelData::fillHole(int x, int y, LimitedRow& row) {
     std::vector<float> values;
     const double distance = far_->at((x + 0.5) / scale_, (y + 0.5) / scale_, values) * scale_;
     for (int c = 0; c < radiance_; ++c)
-        for (const int mean : {planes_.meanA, planes_.meanB})
+        for (const int mean : {planes_.mean(0), planes_.mean(1)})
             gathered_.row(mean + c, y)[x] = values[static_cast<std::size_t>(c)];
     for (int f = 0; f < layout_.features; ++f)
-        gathered_.row(planes_.feature + f, y)[x] = values[static_cast<std::size_t>(radiance_ + f)];
+        gathered_.row(planes_.feature() + f, y)[x] = values[static_cast<std::size_t>(radiance_ + f)];
     return static_cast<float>(std::max<double>(distance, kHoleReach + 1));
 }
 
 void PixelData::limitPixel(int x, int y, LimitedRow& row) {
     const auto raw = [&](int plane) { return gathered_.row(plane, y)[x]; };
-    const float nA = raw(planes_.countA), nB = raw(planes_.countB);
-    const float n = raw(planes_.count);
+    const float nA = raw(planes_.halfCount(0)), nB = raw(planes_.halfCount(1));
+    const float n = raw(planes_.count());
     out_.data.row(dataPlanes_.count(), y)[x] = n;
-    out_.data.row(dataPlanes_.countA(), y)[x] = nA;
-    out_.data.row(dataPlanes_.countB(), y)[x] = nB;
-    out_.data.row(dataPlanes_.stated(), y)[x] = raw(planes_.stated);
+    out_.data.row(dataPlanes_.halfCount(0), y)[x] = nA;
+    out_.data.row(dataPlanes_.halfCount(1), y)[x] = nB;
+    out_.data.row(dataPlanes_.stated(), y)[x] = raw(planes_.stated());
     for (int half = 0; half < 2; ++half)
         for (int c = 0; c < radiance_; ++c)
             out_.data.row(dataPlanes_.mean(half) + c, y)[x] = halfMean(half, c, x, y);
     float squares[3];
-    for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares + c);
+    for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares() + c);
 
     for (int c = 0; c < 3; ++c) out_.data.row(dataPlanes_.removed() + c, y)[x] = 0;
-    const float brightest = raw(planes_.brightestLuminance);
-    const bool exact = raw(planes_.stated) > 0 && squares[0] + squares[1] + squares[2] == 0;
+    const float brightest = raw(planes_.brightestLuminance());
+    const bool exact = raw(planes_.stated()) > 0 && squares[0] + squares[1] + squares[2] == 0;
     if (robust_ && brightest > 0 && !exact) {
         const float most = secondBrightest(x, y);
         if (brightest > most) {
             const float change = most / brightest - 1;  // of every radiance channel of that sample
-            const int half = raw(planes_.brightestHalf) > 0 ? 1 : 0;
+            const int half = raw(planes_.brightestHalf()) > 0 ? 1 : 0;
             const float halfCount = half == 0 ? nA : nB;
             for (int c = 0; c < radiance_; ++c) {
                 if (c == layout_.alpha) continue;
-                const float old = raw(planes_.brightest + c), step = change * old;
+                const float old = raw(planes_.brightest() + c), step = change * old;
                 float* const mean = out_.data.row(dataPlanes_.mean(half) + c, y) + x;
                 if (c < 3) {
                     const float other = out_.data.row(dataPlanes_.mean(1 - half) + c, y)[x];
@@ -128,22 +128,22 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
             row.luminance += static_cast<double>(brightest - most);
         }
     }
-    float freedom = raw(planes_.freedom);
+    float freedom = raw(planes_.freedom());
     if (n == 1 && freedom == 0) borrowSquares(x, y, squares, freedom);
-    for (int c = 0; c < 3; ++c) out_.squares.row(c, y)[x] = squares[c];
-    out_.squares.row(3, y)[x] = freedom;
-    out_.squares.row(4, y)[x] = n;
+    for (int c = 0; c < 3; ++c) out_.squares.row(SquaresPlanes::colour(c), y)[x] = squares[c];
+    out_.squares.row(SquaresPlanes::kFreedom, y)[x] = freedom;
+    out_.squares.row(SquaresPlanes::kSamples, y)[x] = n;
     const double all = unit_ * (static_cast<double>(squares[0]) + squares[1] + squares[2]);
-    out_.squares.row(5, y)[x] = static_cast<float>(all * all);
+    out_.squares.row(SquaresPlanes::kAllSquared, y)[x] = static_cast<float>(all * all);
 }
 
 /// Mean of a half. Where a pixel has samples, but none of it, what its neighbours have on average stands in,
 /// else the nearest, else the other half; with count 0: no datum, but something for patches to be alike to.
 float PixelData::halfMean(int half, int c, int x, int y) const {
-    const int count = half == 0 ? planes_.countA : planes_.countB;
-    const int mean = (half == 0 ? planes_.meanA : planes_.meanB) + c;
+    const int count = planes_.halfCount(half);
+    const int mean = planes_.mean(half) + c;
     const float own = gathered_.row(mean, y)[x];
-    if (gathered_.row(count, y)[x] > 0 || gathered_.row(planes_.count, y)[x] == 0) return own;
+    if (gathered_.row(count, y)[x] > 0 || gathered_.row(planes_.count(), y)[x] == 0) return own;
     float sum = 0;
     int found = 0;
     for (const auto& [dx, dy] : kNeighbours) {
@@ -154,7 +154,7 @@ float PixelData::halfMean(int half, int c, int x, int y) const {
     }
     if (found > 0) return sum / static_cast<float>(found);
     if (const Place from = nearest(count, x, y); from.x >= 0) return gathered_.row(mean, from.y)[from.x];
-    return gathered_.row((half == 0 ? planes_.meanB : planes_.meanA) + c, y)[x];
+    return gathered_.row(planes_.mean(1 - half) + c, y)[x];
 }
 
 /// The second largest luminance of a sample within kFireflyReach pixels of the dump; as large as can be where
@@ -167,8 +167,8 @@ float PixelData::secondBrightest(int x, int y) const {
     float most = 0, second = 0, samples = 0;
     for (int row = begin(y); row < end(y, height_); ++row)
         for (int col = begin(x); col < end(x, width_); ++col) {
-            samples += gathered_.row(planes_.count, row)[col];
-            for (const int plane : {planes_.brightestLuminance, planes_.secondLuminance}) {
+            samples += gathered_.row(planes_.count(), row)[col];
+            for (const int plane : {planes_.brightestLuminance(), planes_.secondLuminance()}) {
                 const float l = gathered_.row(plane, row)[col];
                 if (l > most) {
                     second = most;
@@ -187,12 +187,12 @@ void PixelData::borrowSquares(int x, int y, float* squares, float& freedom) cons
     float sum[3] = {};
     int pairs = 0;
     const auto mean = [&](int c, int col, int row) {
-        const bool inA = gathered_.row(planes_.countA, row)[col] > 0;
-        return gathered_.row((inA ? planes_.meanA : planes_.meanB) + c, row)[col];
+        const int half = gathered_.row(planes_.halfCount(0), row)[col] > 0 ? 0 : 1;
+        return gathered_.row(planes_.mean(half) + c, row)[col];
     };
     for (const auto& [dx, dy] : kNeighbours) {
         if (x + dx < 0 || x + dx >= width_ || y + dy < 0 || y + dy >= height_) continue;
-        if (gathered_.row(planes_.count, y + dy)[x + dx] == 0) continue;
+        if (gathered_.row(planes_.count(), y + dy)[x + dx] == 0) continue;
         ++pairs;
         for (int c = 0; c < 3; ++c) {
             const float d = mean(c, x, y) - mean(c, x + dx, y + dy);

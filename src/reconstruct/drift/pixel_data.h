@@ -5,7 +5,6 @@
 
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/pixel_statistics.h"
-#include "reconstruct/common/row_ring.h"
 #include "reconstruct/drift/gap_field.h"
 
 /// From gathered statistics to the data that are kriged: means of the halves without fireflies, holes filled.
@@ -14,44 +13,14 @@ namespace vlx {
 /// Pixels within which a pixel without samples, or without those of a half, looks for some.
 inline constexpr int kHoleReach = 5;
 
-/// Planes of the data.
-struct DataPlanes {
-    int radiance = 3;
-    int meanA() const { return 0; }  ///< radiance channels
-    int meanB() const { return radiance; }
-    int countA() const { return 2 * radiance; }  ///< samples: 0 where the mean is no datum
-    int countB() const { return 2 * radiance + 1; }
-    int count() const { return 2 * radiance + 2; }
-    int stated() const { return 2 * radiance + 3; }  ///< 1 where the dump states the error variance
-    int gap() const { return 2 * radiance + 4; }  ///< pixels to the nearest samples: 0 where there are some
-    int removed() const { return 2 * radiance + 5; }  ///< R, G, B taken off the mean as a firefly's
-    int channels() const { return 2 * radiance + 8; }
-
-    int mean(int half) const { return half == 0 ? meanA() : meanB(); }
-    int halfCount(int half) const { return half == 0 ? countA() : countB(); }
-};
-
-/// Mean of all samples of a pixel; 0 where it has none.
-inline double plainMean(const RowRing& data, const DataPlanes& planes, int channel, int x, int y) {
-    const double nA = data.row(planes.countA(), y)[x], nB = data.row(planes.countB(), y)[x];
-    if (nA + nB <= 0) return 0;
-    return (nA * static_cast<double>(data.row(planes.meanA() + channel, y)[x]) +
-            nB * static_cast<double>(data.row(planes.meanB() + channel, y)[x])) /
-           (nA + nB);
-}
-
 /// Degrees of freedom of a pixel of one sample, whose variance is what its neighbours differ from it by.
 inline constexpr float kBorrowedFreedom = 1e-3f;
-
-/// Planes of `squares`: sums of squares of R, G, B; their degrees of freedom; samples; the square of the
-/// sums' sum over R, G, B, in the picture's own unit.
-inline constexpr int kSquaresPlanes = 6;
 
 /// What kriging starts from, a ring of rows each.
 struct PixelRows {
     RowRing data;     ///< DataPlanes
-    RowRing squares;  ///< kSquaresPlanes
-    RowRing raw;      ///< f features, then the error variances of their means
+    RowRing squares;  ///< SquaresPlanes
+    RowRing raw;      ///< FeaturePlanes
 };
 
 /// What was taken off the fireflies of a row, and what was filled in.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "reconstruct/common/wide.h"
+#include "base/simd.h"
 
 namespace vlx {
 
@@ -11,12 +11,12 @@ namespace {
 
 constexpr float kFeatureFloor = 1e-4f;  // differences of a hundredth of a feature's scale are none
 
-/// weights[i] = nearExp(max(0, d[i])), summed into `total`, and into sums of each value and variance.
+/// weights[i] = simd::nearExp(max(0, d[i])), summed into `total`, and into sums of each value and variance.
 VLX_WIDE void accumulate(const float* __restrict distances, int count, const float* const* values,
                          const float* const* variances, int channels, float* __restrict weights,
                          float* __restrict total, float* const* sums, float* const* squares) {
     for (int i = 0; i < count; ++i) {
-        const float w = nearExp(distances[i] > 0 ? distances[i] : 0.f);
+        const float w = simd::nearExp(distances[i] > 0 ? distances[i] : 0.f);
         weights[i] = w;
         total[i] += w;
     }
@@ -45,8 +45,8 @@ VLX_WIDE void addWeighted(const float* const* there, const float* const* here, c
             weights[i] += d * d * s[i];
         }
     }
-    for (int i = first; i < last; ++i) weights[i] = nearExp(weights[i]);
-    for (int c = 0; c < kSquaresPlanes; ++c) {
+    for (int i = first; i < last; ++i) weights[i] = simd::nearExp(weights[i]);
+    for (int c = 0; c < SquaresPlanes::kChannels; ++c) {
         const float* __restrict q = squares[c];
         float* __restrict s = sums[c];
         for (int i = first; i < last; ++i) s[i] += weights[i] * q[i + dx];
@@ -78,7 +78,8 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
         bool noisy = false;
         for (int c = 0; c < channels; ++c) {
             copyTile(raw, first + c, x, y, width, height, tile.values(c));
-            copyTile(raw, layout.features + first + c, x, y, width, height, errors.data());
+            copyTile(raw, FeaturePlanes{layout.features}.error(first + c), x, y, width, height,
+                     errors.data());
             float* out = tile.variances(c);
             for (int row = 0; row < kTileSide; ++row)
                 for (int i = 0; i < kTileSide; ++i) {
@@ -123,7 +124,7 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
                     const float w = noisy ? total[at] : 1;
                     const auto plane = static_cast<std::size_t>(2 * c) * kTile * kTile;
                     features.row(first + c, row)[col] = noisy ? sums[plane + at] / w : tile.values(c)[here];
-                    features.row(layout.features + first + c, row)[col] =
+                    features.row(FeaturePlanes{layout.features}.error(first + c), row)[col] =
                         noisy ? sums[plane + kTile * kTile + at] / (w * w) : 0;
                 }
         first = last;
@@ -134,20 +135,20 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
                      const RowRing& features, int featureCount, const PictureScale& picture,
                      const RowRing* wide, int y, int width, int height, RowRing& variances) {
     const auto count = static_cast<std::size_t>(featureCount), w = static_cast<std::size_t>(width);
-    std::vector<float> scales(count * w), sums(kSquaresPlanes * w), weights(w);
+    std::vector<float> scales(count * w), sums(SquaresPlanes::kChannels * w), weights(w);
     std::vector<const float*> here(count), there(count), scale(count);
     for (std::size_t f = 0; f < count; ++f) {
         here[f] = features.row(static_cast<int>(f), y);
-        const float* errors = features.row(featureCount + static_cast<int>(f), y);
+        const float* errors = features.row(FeaturePlanes{featureCount}.error(static_cast<int>(f)), y);
         for (std::size_t i = 0; i < w; ++i) scales[f * w + i] = 1 / (kAlikeFeatures2 + 2 * errors[i]);
         scale[f] = scales.data() + f * w;
     }
-    float* out[kSquaresPlanes];
-    for (std::size_t c = 0; c < kSquaresPlanes; ++c) out[c] = sums.data() + c * w;
+    float* out[SquaresPlanes::kChannels];
+    for (std::size_t c = 0; c < SquaresPlanes::kChannels; ++c) out[c] = sums.data() + c * w;
     for (int row = std::max(0, y - kVarianceReach); row <= std::min(height - 1, y + kVarianceReach); ++row) {
         for (std::size_t f = 0; f < count; ++f) there[f] = features.row(static_cast<int>(f), row);
-        const float* in[kSquaresPlanes];
-        for (int c = 0; c < kSquaresPlanes; ++c) in[c] = squares.row(c, row);
+        const float* in[SquaresPlanes::kChannels];
+        for (int c = 0; c < SquaresPlanes::kChannels; ++c) in[c] = squares.row(c, row);
         for (int dx = -kVarianceReach; dx <= kVarianceReach; ++dx)
             addWeighted(there.data(), here.data(), scale.data(), featureCount, in, std::max(0, -dx),
                         std::min(width, width - dx), dx, weights.data(), out);
@@ -155,9 +156,9 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
     for (std::size_t i = 0; i < w; ++i) {
         const auto sum = [&](int plane) { return static_cast<double>(out[plane][i]); };
         const auto around = [&](int plane) { return static_cast<double>(wide->row(plane, y / 2)[i / 2]); };
-        const double freedom = sum(3);
-        variances.row(3, y)[i] =
-            static_cast<float>(rarityOf((sum(0) + sum(1) + sum(2)) * picture.unit(), sum(5), freedom));
+        const double freedom = sum(SquaresPlanes::kFreedom);
+        variances.row(VariancePlanes::kRarity, y)[i] = static_cast<float>(
+            rarityOf((sum(0) + sum(1) + sum(2)) * picture.unit(), sum(SquaresPlanes::kAllSquared), freedom));
         const bool stated = data.row(planes.stated(), y)[i] > 0;
         for (int c = 0; c < 3; ++c) {
             double variance = picture.variance[c];
@@ -168,8 +169,9 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
                 };
                 const double own = std::max(mean(0), mean(1));
                 const bool agree = variance <= kAgreement * kAgreement * own * own;
-                if (agree && !stated && wide && around(3) > 0) {
-                    const double more = around(3) / (1 + 2 * freedom / around(3));
+                const double rarity = agree && !stated && wide ? around(VariancePlanes::kRarity) : 0;
+                if (rarity > 0) {
+                    const double more = rarity / (1 + 2 * freedom / rarity);
                     variance = (sum(c) + more * around(c)) / (freedom + more);
                 }
                 if (!agree && !stated && freedom < 1) {  // a few pairs may be alike by chance
@@ -177,7 +179,8 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
                     variance = (freedom * variance + kPicture * picture.variance[c]) / (freedom + kPicture);
                 }
                 if (!stated)
-                    variance += unseenVariance(sum(4), agree ? std::max(own, picture.level) : picture.level);
+                    variance += unseenVariance(sum(SquaresPlanes::kSamples),
+                                               agree ? std::max(own, picture.level) : picture.level);
             }
             variances.row(c, y)[i] = static_cast<float>(variance);
         }

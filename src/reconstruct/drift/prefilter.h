@@ -2,7 +2,6 @@
 
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/pixel_statistics.h"
-#include "reconstruct/common/row_ring.h"
 #include "reconstruct/drift/patch_similarity.h"
 #include "reconstruct/drift/pixel_data.h"
 
@@ -14,19 +13,17 @@ namespace vlx {
 inline constexpr float kAlikeFeatures2 = 0.01f;
 inline constexpr int kFeatureReach = 5;   ///< pixels around a pixel that its features are averaged over
 inline constexpr int kVarianceReach = 5;  ///< and its error variance
-/// Variance of one sample of R, G, B, and how many degrees of freedom it takes to meet what makes it.
-inline constexpr int kVariancePlanes = 4;
 
-/// Prefilters the features (`raw`: f of them, then the error variances of their means) of the rows
+/// Prefilters the features (FeaturePlanes, as `features`) of the rows
 /// [y, y + kTile) at columns [x, x + kTile) (cut to the image): non-local means in each group, weights
-/// exp(-d) of patch_similarity.h. Writes the features (planes 0 to f - 1) and their error variances (f to 2 f
-/// - 1: sum w^2 v / (sum w)^2). A group without noise is copied. The error variance that steers the weights
-/// is averaged with that of the 3 x 3 pixels around.
+/// exp(-d) of patch_similarity.h. The error variance of what is written is sum w^2 v / (sum w)^2. A group
+/// without noise is copied. The error variance that steers the weights is averaged with that of the 3 x 3
+/// pixels around.
 void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
                        RowRing& features);
 
 /// Variance of one sample of R, G, B for the pixels of row y: V = sum w S / F, F = sum w (n - 1), over the
-/// pixels within kVarianceReach, S their sums of squares and n their counts (`squares`: kSquaresPlanes),
+/// pixels within kVarianceReach, S their sums of squares and n their counts (SquaresPlanes),
 ///     w = exp(-sum over features of df^2 / (0.1^2 + 2 v)),   v the pixel's own feature error variance.
 ///
 /// What scatters may be rare. r = F sum w T^2 / (sum w T)^2, T a pixel's S over R, G and B, is in how many
@@ -39,7 +36,7 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
 /// unseenVariance() of the sum w n samples is added, of the picture's level; where samples agree, of their
 /// own if that is larger. Where no pixel has two samples, the picture's variance counts as two more pixels;
 /// where none has a neighbour to compare it with, it stands alone. Where the dump states the variances,
-/// nothing is added to them. Writes kVariancePlanes: the variances, above 0 but where the dump states 0, and
+/// nothing is added to them. Writes VariancePlanes: the variances, above 0 but where the dump states 0, and
 /// r (0: nothing scatters).
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
                      const RowRing& features, int featureCount, const PictureScale& picture,

@@ -6,14 +6,13 @@
 
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
-#include "variolux/compare/gaussian.h"
 #include "variolux/compare/metrics.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/sample_buffer.h"
 #include "variolux/dump/sample_writer.h"
 #include "variolux/dump/writer.h"
 #include "variolux/geostat/variogram_model.h"
-#include "variolux/reconstruct/drift_kriging.h"
+#include "variolux/reconstruct/reconstruct.h"
 
 namespace {
 
@@ -86,12 +85,12 @@ void renderTiles() {
     // The same samples without a file, as a viewport would.
     const vlx::SampleBuffer buffer(dump.header(), dump.read(0, kSize));
     std::int64_t rows = 0;
-    const vlx::Reconstruction shown = vlx::reconstructDriftKriging(
-        buffer, {.quality = vlx::Quality::Draft}, [&](std::int64_t done, std::int64_t) { rows = done; });
+    const vlx::Reconstruction shown = vlx::reconstruct(buffer, vlx::Drift{.quality = vlx::Quality::Draft},
+                                                       [&](std::int64_t done, std::int64_t) { rows = done; });
     expect(rows == kSize, "a reconstruction tells its progress");
-    expect(shown.image.pixels ==
-               vlx::reconstructDriftKriging(dump, {.quality = vlx::Quality::Draft}).image.pixels,
-           "samples in memory give the image that a dump gives");
+    expect(
+        shown.image.pixels == vlx::reconstruct(dump, vlx::Drift{.quality = vlx::Quality::Draft}).image.pixels,
+        "samples in memory give the image that a dump gives");
 }
 
 void useGeostatistics() {

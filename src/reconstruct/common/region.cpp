@@ -1,4 +1,4 @@
-#include "variolux/reconstruct/region.h"
+#include "reconstruct/common/region.h"
 
 #include <algorithm>
 #include <cassert>
@@ -128,6 +128,15 @@ void estimateErrors(RegionData& data, const Grid& grid, const std::vector<Eigen:
 }
 
 }  // namespace
+
+int RegionData::pixelOf(Eigen::Index i) const {
+    // Clamped before it is an int: positions of other conventions may be anywhere.
+    const auto within = [](double position, int first, int count) {
+        return static_cast<int>(std::clamp(std::floor(position) - first, 0.0, count - 1.0));
+    };
+    return within(positions(i, 1), pixels.y, pixels.height) * pixels.width +
+           within(positions(i, 0), pixels.x, pixels.width);
+}
 
 RegionData gatherRegion(const SampleBand& band, const BandLayout& layout, const Window& region,
                         int cellsPerPixel) {

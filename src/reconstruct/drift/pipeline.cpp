@@ -1,9 +1,8 @@
-#include "variolux/reconstruct/drift_kriging.h"
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
+#include "reconstruct/common/methods.h"
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/pixel_statistics.h"
 #include "reconstruct/common/rebin.h"
@@ -53,7 +52,7 @@ Window scaled(const Window& window, int scale) {
 }
 
 /// Throws Error when the options are invalid, by themselves or for this dump.
-void check(const SampleSource& dump, const DriftKrigingOptions& options) {
+void check(const SampleSource& dump, const Drift& options) {
     if (const auto broken = options.validate()) throw Error("", *broken);
     for (const Window& w : {dump.header().data, dump.header().display}) {
         const std::int64_t scale = options.scale;
@@ -68,44 +67,44 @@ void check(const SampleSource& dump, const DriftKrigingOptions& options) {
 /// resolution is corrected by that of half the resolution, and finished.
 class Pipeline {
   public:
-    Pipeline(const SampleSource& dump, const DriftKrigingOptions& options, const RowSink& sink,
-             const Progress& progress)
+    Pipeline(const SampleSource& dump, const Drift& options, const RowSink& sink, const Progress& progress)
         : dump_(dump),
           options_(options),
           sink_(sink),
           progress_(progress),
           layout_(layoutOf(dump, options)),
-          planes_(layout_),
+          planes_{layout_.radiance, layout_.features},
           width_(dump.header().data.width * options.scale),
           height_(dump.header().data.height * options.scale),
           halved_(std::min(width_, height_) >= kLeastHalved),
           readRows_(kReadRows / options.scale),
           radiance_(layout_.radiance),
-          clock_(report_),
+          drift_(report_.method.emplace<DriftReport>()),
+          clock_(drift_.seconds),
           picture_(measurePictureScale(dump, layout_)),
-          gathered_(width_, planes_.channels, kept(kGatheredRows)),
+          gathered_(width_, planes_.channels(), kept(kGatheredRows)),
           fine_(
               layout_, modelsOf(options.quality, false), width_, height_, halved_ ? kAheadRows : 0, picture_,
-              [this](int until) { fill(until); }, report_, clock_),
+              [this](int until) { fill(until); }, drift_, clock_),
           pixels_(dump, layout_, planes_, picture_, options.scale, width_, height_,
                   options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
-          differences_(width_, halved_ ? Correction::differencePlanes(radiance_) : 0, kept(kCorrectedRows)),
+          differences_(width_, halved_ ? DifferencePlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           clean_(width_, radiance_, kept(kFinishingRows)),
-          light_(width_, Finishing::kLightPlanes, kept(kFinishingRows)),
+          light_(width_, LightPlanes::kChannels, kept(kFinishingRows)),
           finishing_(layout_, options.strength, options.scale, picture_, fine_.rows(),
                      halved_ ? corrected_ : fine_.rows().combined, clean_, light_) {
         if (halved_) {
             coarse_ = std::make_unique<Level>(
                 layout_, modelsOf(options.quality, true), (width_ + 1) / 2, (height_ + 1) / 2, kAheadRows,
-                picture_, [this](int until) { fill(2 * until); }, report_, clock_);
+                picture_, [this](int until) { fill(2 * until); }, drift_, clock_);
             fine_.lookAt(*coarse_);
             correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
                                                        corrected_);
         }
         requireMemory(dump.path(), ringBytes(), "rows as wide as these");
         if (options.maxMemory > 0) limitRowsRead();
-        const Window window = driftKrigingOutline(dump, options).data;
+        const Window window = driftOutline(dump, options).data;
         firstRow_ = window.y - scaled(dump.header().data, options.scale).y;
         endRow_ = firstRow_ + window.height;
         rows_ = Image({0, 0, width_, kept(kTile)},
@@ -119,16 +118,16 @@ class Pipeline {
             if (progress_) progress_(finishedRows_ - firstRow_, endRow_ - firstRow_);
         }
         if (luminance_ > 0) {
-            report_.energyRemoved = removed_ / luminance_;
-            report_.energyReturned = returned_ / luminance_;
+            drift_.energyRemoved = removed_ / luminance_;
+            drift_.energyReturned = returned_ / luminance_;
         }
-        for (const auto& [stage, seconds] : report_.seconds)
+        for (const auto& [stage, seconds] : drift_.seconds)
             (stage == "read" ? report_.readSeconds : report_.solveSeconds) += seconds;
         return std::move(report_);
     }
 
   private:
-    static SampleLayout layoutOf(const SampleSource& dump, const DriftKrigingOptions& options) {
+    static SampleLayout layoutOf(const SampleSource& dump, const Drift& options) {
         SampleLayout layout = chooseSampleLayout(dump, options);
         if (layout.features + 5 > kMaxRandomDrift || layout.radiance > kMaxRandomDrift)
             throw Error(dump.path(), "expected at most " + std::to_string(kMaxRandomDrift - 5) +
@@ -228,7 +227,7 @@ class Pipeline {
                 report_.samples += of.samples;
                 report_.droppedSamples += of.dropped;
                 report_.emptyPixels += of.empty;
-                report_.limitedSamples += of.limited;
+                drift_.limitedSamples += of.limited;
                 luminance_ += of.luminance;
                 removed_ += of.removed;
             }
@@ -251,8 +250,8 @@ class Pipeline {
             for (int y = first; y < end; ++y) {
                 if (!own(y)) continue;
                 const LimitedRow& of = limited[static_cast<std::size_t>(y - first)];
-                report_.limitedSamples += of.samples;
-                report_.farPixels += of.farPixels;
+                drift_.limitedSamples += of.samples;
+                drift_.farPixels += of.farPixels;
                 removed_ += of.luminance;
             }
             if (coarse_)
@@ -303,7 +302,7 @@ class Pipeline {
                 finishing_.outputRow(static_cast<int>(y), rows_.at(0, row));
         });
         for (const Finishing::Counts& of : counts) {
-            report_.exactPixels += of.exact;
+            drift_.exactPixels += of.exact;
             returned_ += of.returned;
         }
         clock_.addTo("finishing");
@@ -313,7 +312,7 @@ class Pipeline {
     }
 
     const SampleSource& dump_;
-    const DriftKrigingOptions& options_;
+    const Drift& options_;
     const RowSink& sink_;
     const Progress& progress_;
     SampleLayout layout_;
@@ -322,6 +321,7 @@ class Pipeline {
     bool halved_;  // large enough for a coarse level
     int readRows_, radiance_;
     ReconstructionReport report_;
+    DriftReport& drift_;  // in it
     StageClock clock_;
     PictureScale picture_;
     RowRing gathered_;
@@ -341,7 +341,7 @@ class Pipeline {
 
 }  // namespace
 
-std::optional<std::string> DriftKrigingOptions::validate() const {
+std::optional<std::string> Drift::validate() const {
     if (!(strength >= 0 && strength <= 1))
         return "expected a strength of 0 to 1, found " + std::to_string(strength);
     if (scale < 1 || scale > 4) return "expected a scale of 1 to 4, found " + std::to_string(scale);
@@ -353,7 +353,7 @@ std::optional<std::string> DriftKrigingOptions::validate() const {
     return std::nullopt;
 }
 
-Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& options) {
+Image driftOutline(const SampleSource& dump, const Drift& options) {
     check(dump, options);
     Image image;
     image.data = bandOf(scaled(dump.header().data, options.scale), options.band);
@@ -366,31 +366,14 @@ Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& o
     if (findChannel(dump.header(), "A") >= 0) image.channels.emplace_back("A");
     const std::vector<std::string> further = furtherRadiance(dump.header(), options);
     image.channels.insert(image.channels.end(), further.begin(), further.end());
-    for (const char* name : {"stddev.R", "stddev.G", "stddev.B"}) image.channels.emplace_back(name);
+    image.channels.insert(image.channels.end(), std::begin(kStddevChannels), std::end(kStddevChannels));
     return image;
 }
 
-ReconstructionReport reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
-                                             const RowSink& sink, const Progress& progress) {
+ReconstructionReport reconstructDrift(const SampleSource& dump, const Drift& options, const RowSink& sink,
+                                      const Progress& progress) {
     check(dump, options);
     return Pipeline(dump, options, sink, progress).run();
-}
-
-Reconstruction reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
-                                       const Progress& progress) {
-    const Image outline = driftKrigingOutline(dump, options);
-    requireMemory(dump.path(), imageBytes(outline.data, outline.channels.size()), "an image held whole");
-    Reconstruction result;
-    result.image = Image(outline.data, outline.channels);
-    result.image.display = outline.display;
-    int row = 0;
-    const auto keep = [&](const float* rows, int count) {
-        std::copy(rows, rows + std::ptrdiff_t{count} * outline.data.width * outline.channelCount(),
-                  result.image.at(0, row));
-        row += count;
-    };
-    result.report = reconstructDriftKriging(dump, options, keep, progress);
-    return result;
 }
 
 }  // namespace vlx

@@ -1,14 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "variolux/base/progress.h"
-#include "variolux/dump/reader.h"
-#include "variolux/reconstruct/reconstruction.h"
+#include "variolux/base/window.h"
 
 /// The default method: kriging with external drift in overlapping neighbourhoods, several models, chosen
 /// between by halves of the samples.
@@ -89,7 +86,13 @@ enum class Fireflies {
     Clamp,   ///< samples above a given luminance are scaled down to it: a bias that stays
 };
 
-struct DriftKrigingOptions {
+/// The method's options. With a scale above 1 the samples are sorted into parts of their pixels by their
+/// positions, and parts without samples are predicted; the windows grow by the scale. Memory depends on the
+/// picture's width, not its height. Every channel gets the same weights: parts that add up to R, G, B still
+/// do. A pixel without samples is predicted and counted; a sample with radiance that is not finite counts as
+/// left out. reconstruct() throws Error when options name channels that the dump lacks, ask for a scale where
+/// it has no positions or for more bands than rows, and when maxMemory is too little, saying what would do.
+struct Drift {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;
     double clamp = 10;             ///< luminance, Fireflies::Clamp; > 0
@@ -109,29 +112,5 @@ struct DriftKrigingOptions {
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
 };
-
-/// Takes the next `count` finished rows of an image, from the top: interleaved channels, as Image::pixels has
-/// them.
-using RowSink = std::function<void(const float* rows, int count)>;
-
-/// The image that reconstructDriftKriging() makes, without its pixels: windows and channels.
-Image driftKrigingOutline(const SampleSource& dump, const DriftKrigingOptions& options);
-
-/// With a scale above 1 the samples are sorted into parts of their pixels by their positions, and parts
-/// without samples are predicted; the windows grow by the scale.
-///
-/// Reads the dump once, in bands; memory depends on its width, not its height. Bit-identical for any number
-/// of threads. Every channel gets the same weights: parts that add up to R, G, B still do. Channels of the
-/// image: R, G, B, A when the dump has it, further radiance, stddev.R, .G, .B. A pixel without samples is
-/// predicted and counted; a sample with radiance that is not finite counts as left out.
-/// Throws as SampleSource::read; Error when options are invalid, name channels that the dump lacks, ask for a
-/// scale where it has no positions or for more bands than rows, and when maxMemory is too little, saying what
-/// would do.
-Reconstruction reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
-                                       const Progress& progress = {});
-
-/// The same row by row: the image is never held whole.
-ReconstructionReport reconstructDriftKriging(const SampleSource& dump, const DriftKrigingOptions& options,
-                                             const RowSink& sink, const Progress& progress = {});
 
 }  // namespace vlx

@@ -23,6 +23,8 @@ struct RegionData {
     std::int64_t dropped = 0;        ///< samples with a non-finite R, G or B: left out
 
     int size() const { return static_cast<int>(counts.size()); }
+    /// The index of the pixel of the region, row by row, that datum i lies in.
+    int pixelOf(Eigen::Index i) const;
 };
 
 /// Which channels of a band hold what. Positions are optional (-1).

@@ -2,11 +2,22 @@
 
 #include <utility>
 
-/// Elementary functions of several doubles at a time, in GCC's vector types of 16, 32 or 64 bytes: no
-/// branches, accurate to about an ulp, and the same bits for every width. Always inlined, so that they are
-/// compiled for the instruction set of their caller. Translation units that include this header are compiled
-/// with -ffp-contract=off -fno-math-errno.
-namespace vlx::kernels {
+// SIMD, with the same bits on every instruction set; two ways to it. Files that use either are compiled with
+// -ffp-contract=off -fno-math-errno.
+
+/// Where the compiler vectorises by itself: marks a function with long loops over floats, which is compiled
+/// for AVX2 as well and chosen at run time. Not under sanitizers, whose instrumented resolvers run before
+/// their runtime is ready.
+#if defined(__x86_64__) && !defined(VARIOLUX_SANITIZED)
+#define VLX_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define VLX_WIDE
+#endif
+
+/// Where it cannot: elementary functions of several doubles at a time, in GCC's vector types of 16, 32 or 64
+/// bytes: no branches, accurate to about an ulp. Always inlined, so that they are compiled for the
+/// instruction set of their caller.
+namespace vlx::simd {
 
 template <class T, int bytes>
 struct Vectors {
@@ -128,4 +139,14 @@ template <class V>
     return x > 0.0 ? e.scale + e.scale * e.rest : V{};
 }
 
-}  // namespace vlx::kernels
+/// exp(-d) within 0.02 for d >= 0, exactly 0 from 8 on: (1 - d/8)^8. A weight needs no more, and this is four
+/// products.
+inline float nearExp(float d) {
+    const float base = 1 - 0.125f * d;
+    const float positive = base > 0 ? base : 0;
+    const float square = positive * positive;
+    const float fourth = square * square;
+    return fourth * fourth;
+}
+
+}  // namespace vlx::simd

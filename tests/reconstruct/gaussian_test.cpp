@@ -1,4 +1,4 @@
-#include "variolux/compare/gaussian.h"
+#include "variolux/reconstruct/gaussian.h"
 
 #include <gtest/gtest.h>
 

@@ -25,4 +25,10 @@ struct GaussianResult {
 /// Throws Error unless sigma is positive and finite. Bit-identical for any number of threads.
 GaussianResult gaussianFilter(const Image& image, double sigma);
 
+/// As a method: the average (mean.h), filtered. A pixel without samples has no part in its neighbours. The
+/// error of a filtered pixel is mostly bias, which this filter cannot know: no layer stddev.
+struct Gaussian {
+    double sigma = 1;  ///< pixels
+};
+
 }  // namespace vlx

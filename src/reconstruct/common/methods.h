@@ -1,0 +1,19 @@
+#pragma once
+
+#include "variolux/reconstruct/reconstruct.h"
+
+/// The methods behind the door: each gives its rows to the sink as reconstruct() says.
+namespace vlx {
+
+inline constexpr const char* kStddevChannels[] = {"stddev.R", "stddev.G", "stddev.B"};
+
+Image driftOutline(const SampleSource& source, const Drift& method);
+
+ReconstructionReport reconstructDrift(const SampleSource& source, const Drift& method, const RowSink& sink,
+                                      const Progress& progress);
+ReconstructionReport reconstructPaper(const SampleSource& source, const Paper& method, const RowSink& sink,
+                                      const Progress& progress);
+ReconstructionReport reconstructMean(const SampleSource& source, const Mean& method, const RowSink& sink,
+                                     const Progress& progress);
+
+}  // namespace vlx

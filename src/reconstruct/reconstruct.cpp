@@ -1,0 +1,72 @@
+#include "variolux/reconstruct/reconstruct.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "reconstruct/common/bands.h"
+#include "reconstruct/common/methods.h"
+#include "variolux/base/memory.h"
+
+namespace vlx {
+
+namespace {
+
+Reconstruction whole(const SampleSource& source, const Image& outline, const auto& rowsOf) {
+    requireMemory(source.path(), imageBytes(outline.data, outline.channels.size()), "an image held whole");
+    Reconstruction result;
+    result.image = Image(outline.data, outline.channels);
+    result.image.display = outline.display;
+    int row = 0;
+    result.report = rowsOf([&](const float* rows, int count) {
+        std::copy(rows, rows + std::ptrdiff_t{count} * outline.data.width * outline.channelCount(),
+                  result.image.at(0, row));
+        row += count;
+    });
+    return result;
+}
+
+ReconstructionReport reconstructGaussian(const SampleSource& source, const Gaussian& method,
+                                         const RowSink& sink, const Progress& progress) {
+    const Mean mean{.empty = std::numeric_limits<float>::quiet_NaN()};  // a hole to the filter
+    const Reconstruction average = whole(source, outline(source, mean), [&](const RowSink& keep) {
+        return reconstructMean(source, mean, keep, progress);
+    });
+    const Image filtered = gaussianFilter(average.image.select({"R", "G", "B"}), method.sigma).image;
+    sink(filtered.pixels.data(), filtered.data.height);
+    return average.report;
+}
+
+}  // namespace
+
+Image outline(const SampleSource& source, const Method& method) {
+    if (const Drift* drift = std::get_if<Drift>(&method)) return driftOutline(source, *drift);
+    Image image;
+    image.data = source.header().data;
+    image.display = source.header().display;
+    image.channels = {"R", "G", "B"};
+    if (std::holds_alternative<Gaussian>(method)) return image;
+    if (findChannel(source.header(), "A") >= 0) image.channels.emplace_back("A");
+    for (const char* layer : kStddevChannels) image.channels.emplace_back(layer);
+    return image;
+}
+
+ReconstructionReport reconstruct(const SampleSource& source, const Method& method, const RowSink& sink,
+                                 const Progress& progress) {
+    struct Run {
+        const SampleSource& source;
+        const RowSink& sink;
+        const Progress& progress;
+        auto operator()(const Drift& m) const { return reconstructDrift(source, m, sink, progress); }
+        auto operator()(const Paper& m) const { return reconstructPaper(source, m, sink, progress); }
+        auto operator()(const Mean& m) const { return reconstructMean(source, m, sink, progress); }
+        auto operator()(const Gaussian& m) const { return reconstructGaussian(source, m, sink, progress); }
+    };
+    return std::visit(Run{source, sink, progress}, method);
+}
+
+Reconstruction reconstruct(const SampleSource& source, const Method& method, const Progress& progress) {
+    return whole(source, outline(source, method),
+                 [&](const RowSink& keep) { return reconstruct(source, method, keep, progress); });
+}
+
+}  // namespace vlx
