@@ -243,7 +243,7 @@ ImageWriter::ImageWriter(const std::string& path, const Window& data, const Wind
     : impl_(new Impl) {
     std::string extension = std::filesystem::path(path).extension().string();
     for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (extension == ".exr")
+    if (extension == ".exr" || extension == ".sxr" || extension == ".mxr")  // OpenEXR's names
         impl_->rows = std::make_unique<ExrWriter>(path, data, display, channels, options);
     else
         impl_->rows = std::make_unique<OtherWriter>(path, data, display, channels, options);

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "base/image_library.h"
 #include "temporary_folder.h"
 #include "variolux/base/error.h"
 
@@ -27,6 +28,20 @@ TEST(ImageIo, ExrKeepsValuesWindowsAndChannelNames) {
     EXPECT_EQ(back.channels, image.channels);
     EXPECT_EQ(back.pixels, image.pixels);
     EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(ImageIo, CompressionIsKeptUnderEveryNameOfOpenExr) {
+    const TemporaryFolder folder;
+    const Image image(Window{0, 0, 7, 4}, {"R", "G", "B"});
+    ImageWriteOptions options;
+    options.compression = "rle";
+    for (const std::string name : {"a.exr", "a.EXR", "a.sxr", "a.mxr"}) {
+        writeImage(folder / name, image, options);
+        std::string fault;
+        const auto file = imageLibrary().open(folder / name, fault);
+        ASSERT_TRUE(file) << fault;
+        EXPECT_EQ(file->info().text("compression"), "rle") << name;
+    }
 }
 
 TEST(ImageIo, PngStoresValuesAsTheyAre) {
