@@ -100,7 +100,7 @@ Image readImage(const std::string& path) {
     while (input->info().deep)
         if (!input->seek(++part)) throw Error(path, "expected a flat image, found only deep samples");
 
-    const ImageInfo info = input->info();
+    const ImageInfo& info = input->info();
     const Window& data = info.data;
     const auto channels = static_cast<int>(info.channels.size());
     if (data.width <= 0 || data.height <= 0 || channels <= 0 || info.depth > 1)
