@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -112,13 +111,6 @@ vlx::Reconstruction reconstruct(const vlx::KrigeOptions& o, const vlx::SampleSou
     return result;
 }
 
-void writeText(const vlx::OutputFile& file, const std::string& text) {
-    std::ofstream stream(file.temporaryPath(), std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw vlx::Error(file.path(), "writing failed");
-}
-
 std::string inWords(const vlx::Window& w) {
     return "columns " + std::to_string(w.x) + " to " + std::to_string(w.x + (w.width - 1)) + " and rows " +
            std::to_string(w.y) + " to " + std::to_string(w.y + (w.height - 1));
@@ -215,7 +207,7 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
         if (o.diagnostics) vlx::addDiagnosticLayers(result);
         // Both files or none: the image gets its name only when the JSON is complete.
         std::optional<vlx::OutputFile> diagnostics;
-        if (o.diagnostics) writeText(diagnostics.emplace(diagnosticsName), vlx::toJson(result));
+        if (o.diagnostics) diagnostics.emplace(diagnosticsName).write(vlx::toJson(result));
         if (original.empty())
             vlx::writeImage(o.image, result.image, write);
         else

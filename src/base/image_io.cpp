@@ -224,11 +224,7 @@ struct OtherWriter : RowWriter {
     }
     void finish() override {
         if (!output->close()) fail(output->error());
-        std::ofstream bytes(file.temporaryPath(), std::ios::binary);
-        bytes.write(reinterpret_cast<const char*>(output->memory().data()),
-                    static_cast<std::streamsize>(output->memory().size()));
-        bytes.close();
-        if (!bytes) throw Error(file.path(), "writing to disk failed");
+        file.write({reinterpret_cast<const char*>(output->memory().data()), output->memory().size()});
     }
 };
 

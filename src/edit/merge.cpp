@@ -12,6 +12,7 @@
 #include "exr/raw_file.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
 
@@ -35,11 +36,7 @@ std::string text(const std::string& value) { return "'" + value + "'"; }
 std::string text(int value) { return std::to_string(value); }
 std::string text(const std::optional<std::int64_t>& value) { return value ? std::to_string(*value) : "none"; }
 std::string text(const std::optional<double>& value) { return value ? std::to_string(*value) : "none"; }
-std::string text(const std::vector<std::string>& values) {
-    std::string all;
-    for (const auto& value : values) all += (all.empty() ? "" : ", ") + value;
-    return "'" + all + "'";
-}
+std::string text(const std::vector<std::string>& values) { return "'" + listed(values) + "'"; }
 std::string text(const std::optional<std::vector<float>>& value) { return value ? "another matrix" : "none"; }
 
 std::vector<std::string> channelTexts(const DumpHeader& header) {

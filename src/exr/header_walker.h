@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "exr/chunk_codec.h"
+#include "variolux/base/window.h"
 
 namespace vlx {
 
@@ -57,5 +58,10 @@ std::string rawText(const Bytes& bytes, const RawAttribute* attribute);
 
 /// Value of an integer attribute; nothing when there is none.
 std::optional<std::int32_t> rawInt(const Bytes& bytes, const RawAttribute* attribute);
+
+/// The window of pixels [x0, x1] by [y0, y1], as headers state it. Throws Error, with `what` for its name,
+/// when it is none that can be.
+Window checkedWindow(const std::string& path, const std::string& what, std::int64_t x0, std::int64_t y0,
+                     std::int64_t x1, std::int64_t y1);
 
 }  // namespace vlx

@@ -106,8 +106,7 @@ TEST(ImageIo, HugeClaimsOfSmallFilesAreRefused) {
     ImageWriteOptions options;
     options.compression = "none";
     writeImage(folder / "a.exr", Image({0, 0, 4, 4}, {"R", "G", "B"}), options);
-    std::ifstream file(folder / "a.exr", std::ios::binary);
-    std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    std::string bytes = contentsOf(folder / "a.exr");
     for (const std::string name : {"dataWindow", "displayWindow"}) {
         const std::size_t at = bytes.find(name + '\0' + "box2i");
         ASSERT_NE(at, std::string::npos);
@@ -138,11 +137,7 @@ TEST(ImageIo, HugeWindowsAreToldWithTheirSize) {
     const TemporaryFolder folder;
     const std::string path = folder / "huge.exr";
     writeImage(path, Image({0, 0, 4, 4}, {"R", "G", "B"}));
-    std::string bytes;
-    {
-        std::ifstream in(path, std::ios::binary);
-        bytes.assign(std::istreambuf_iterator<char>(in), {});
-    }
+    std::string bytes = contentsOf(path);
     const auto messageOf = [](const std::string& file) {
         try {
             readImage(file);

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +16,7 @@
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
+#include "variolux/base/text.h"
 #include "variolux/compare/metrics.h"
 
 namespace vlx {
@@ -29,11 +28,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kStddev = "stddev";
-
-std::string samplingText(const SweepSampling& sampling) {
-    return sampling.hierarchical ? "tolerance " + numberText(sampling.setting)
-                                 : numberText(sampling.setting) + " spp";
-}
 
 /// One sweep while it runs.
 class Runner {
@@ -87,12 +81,11 @@ class Runner {
     void announce(const std::string& what, const SweepSampling& sampling, int seed, const SweepRecord& record,
                   bool reused) {
         ++step_;
-        char time[32];
-        std::snprintf(time, sizeof time, "%.2f s", record.seconds);
         std::string text = "[" + std::to_string(step_) + "/" + std::to_string(total_) + "] " + what + ", " +
                            samplingText(sampling) + ", seed " + std::to_string(seed) + ": ";
-        text += !record.failure.empty() ? "failed: " + record.failure
-                                        : (std::isfinite(record.seconds) ? std::string(time) : "done");
+        text += !record.failure.empty()
+                    ? "failed: " + record.failure
+                    : (std::isfinite(record.seconds) ? formatted("%.2f s", record.seconds) : "done");
         say(text + (reused ? " (done before)" : ""));
     }
 
@@ -147,6 +140,13 @@ class Runner {
                    : nullptr;
     }
 
+    /// What a run took.
+    static void take(const ProcessRun& run, SweepRecord& record) {
+        record.seconds = run.seconds;
+        record.cpuSeconds = run.cpuSeconds();
+        record.peakBytes = run.peakBytes;
+    }
+
     SweepRecord sample(const std::string& command, const std::string& key, const std::string& dump,
                        const SweepSampling& sampling, int seed) {
         SweepRecord record;
@@ -174,9 +174,7 @@ class Runner {
             const double trace = report.at("traceSeconds"), write = report.at("writeCpuSeconds");
             const double pixels = report.at("width").get<double>() * report.at("height").get<double>();
             record.samplesPerPixel = report.at("samples").get<double>() / pixels;
-            record.seconds = run.seconds;
-            record.cpuSeconds = run.cpuSeconds();
-            record.peakBytes = run.peakBytes;
+            take(run, record);
             // Writing goes on beside tracing: of the wall time it gets its share of the processors.
             const double written = std::min(trace, write / report.at("threads").get<double>());
             record.stages = {{"trace", trace - written},
@@ -209,9 +207,7 @@ class Runner {
         const ProcessRun run = runCommand(plan_.executable(
             filled(record.command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(image)}})));
         record.command = filled(record.command, {{"input", "samples.exr"}, {"output", "image.exr"}});
-        record.seconds = run.seconds;
-        record.cpuSeconds = run.cpuSeconds();
-        record.peakBytes = run.peakBytes;
+        take(run, record);
         if (run.exitCode != 0)
             record.failure = failureOf(run);
         else
@@ -294,9 +290,7 @@ class Runner {
             const ProcessRun run = runCommand(plan_.executable(
                 filled(command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(output)}})));
             record.command = filled(command, {{"input", "samples.exr"}, {"output", "image.exr"}});
-            record.seconds = run.seconds;
-            record.cpuSeconds = run.cpuSeconds();
-            record.peakBytes = run.peakBytes;
+            take(run, record);
             if (run.exitCode != 0)
                 record.failure = failureOf(run);
             else
@@ -308,14 +302,7 @@ class Runner {
         sweep_.records.push_back(record);
     }
 
-    void writeCsv() const {
-        OutputFile file(plan_.options.folder + "/results.csv");
-        std::ofstream stream(file.temporaryPath(), std::ios::binary);
-        stream << toCsv(sweep_.records);
-        stream.close();
-        if (!stream) throw Error(file.path(), "writing failed");
-        file.commit();
-    }
+    void writeCsv() const { writeFile(plan_.options.folder + "/results.csv", toCsv(sweep_.records)); }
 
     SweepPlan plan_;
     std::function<void(const std::string&)> log_;

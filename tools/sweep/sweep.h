@@ -79,6 +79,9 @@ struct SweepSampling {
     bool operator==(const SweepSampling&) const = default;
 };
 
+/// "16 spp", "tolerance 0.1".
+std::string samplingText(const SweepSampling& sampling);
+
 enum class SweepKind {
     Sampling,    ///< a dump was traced, or taken from the input
     Image,       ///< an image was made of it

@@ -167,13 +167,10 @@ std::string SweepPlan::imageKey(const std::string& sampling, const SweepMethod& 
 }
 
 void SweepPlan::requireReferenceWindow(const Window& window) const {
-    const auto text = [](const Window& w) {
-        return std::to_string(w.width) + " x " + std::to_string(w.height) + " pixels at (" +
-               std::to_string(w.x) + ", " + std::to_string(w.y) + ")";
-    };
     const Window& found = reference->colour.data;
     if (!(found == window))
-        throw Error(options.reference, "expected the dump's " + text(window) + ", found " + text(found));
+        throw Error(options.reference,
+                    "expected the dump's " + windowText(window) + ", found " + windowText(found));
 }
 
 SweepPlan planSweep(SweepOptions options, const std::function<void(const std::string&)>& log) {
