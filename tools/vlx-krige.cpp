@@ -164,13 +164,9 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     if (!o.samplingMap.empty() && !o.samplingMap.ends_with(".exr"))
         throw CLI::ValidationError("--sampling-map",
                                    "expected a name that ends with .exr, found '" + o.samplingMap + "'");
-    vlx::InputsHash hash(*o.commandLine,
-                         {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"});
-    for (const std::string& file : files) {
-        hash.add("file", file.empty() ? "none" : "given");  // which of them
-        hash.addFile(file);
-    }
-    const std::string inputs = write.attributes[vlx::kInputsAttribute] = hash.text(o.krige.band);
+    const vlx::Fingerprint made = vlx::fingerprintOf(
+        *o.commandLine, {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"}, files);
+    const std::string inputs = write.attributes[vlx::kInputsAttribute] = made.text(o.krige.band);
     std::vector<std::string> outputs = {o.image};
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
     if (o.diagnostics) outputs.push_back(diagnosticsName);
@@ -198,11 +194,11 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
         report = vlx::reconstructDriftKriging(
             dump, o.krige, [&](const float* rows, int count) { writer.write(rows, count); }, progress);
-        hash.checkUnchanged();
+        made.checkUnchanged();
         writer.close();
     } else {
         vlx::Reconstruction result = reconstruct(o, dump, progress);
-        hash.checkUnchanged();
+        made.checkUnchanged();
         const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
         if (o.diagnostics) vlx::addDiagnosticLayers(result);
         // Both files or none: the image gets its name only when the JSON is complete.

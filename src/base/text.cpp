@@ -37,4 +37,10 @@ std::string formatted(const char* format, double value) {
     return text;
 }
 
+std::string hexText(std::uint64_t value) {
+    char text[17];
+    std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+    return text;
+}
+
 }  // namespace vlx

@@ -11,6 +11,7 @@
 #include "exr/part_layout.h"
 #include "exr/raw_file.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/text.h"
 #include "variolux/dump/reader.h"
@@ -157,19 +158,18 @@ std::string wholeInputs(const std::vector<std::string>& parts) {
     bool allBands = true;
     for (const std::string& part : parts) {
         const std::string inputs = inputsOf(part);
-        const std::size_t end = inputs.find(" band ");
-        if (end == std::string::npos) {
+        const auto found = wholeOfBand(inputs);
+        if (!found) {
             allBands = false;
             continue;
         }
-        const std::string found = inputs.substr(0, end);
         if (runOf.empty()) {
-            run = found;
+            run = *found;
             runOf = part;
         }
-        if (found != run)
+        if (*found != run)
             throw Error(part, "expected a band of the run " + run + " as " + runOf + " is, found one of " +
-                                  found + ": other inputs or parameters");
+                                  *found + ": other inputs or parameters");
     }
     return allBands ? run : std::string();
 }

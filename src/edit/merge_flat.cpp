@@ -8,7 +8,7 @@
 #include "exr/flat_images.h"
 #include "exr/part_layout.h"
 #include "variolux/base/error.h"
-#include "variolux/base/image_io.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/text.h"
 

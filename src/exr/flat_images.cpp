@@ -1,13 +1,13 @@
 #include "exr/flat_images.h"
 
 #include <algorithm>
-#include <bit>
 #include <filesystem>
 #include <limits>
 
 #include "base/image_library.h"
 #include "exr/flat_header.h"
 #include "variolux/base/error.h"
+#include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
 #include "variolux/base/text.h"
 
@@ -153,8 +153,7 @@ class FlatImages::Source {
             if (!part.read(*input, y, rows))
                 throw Error(path_, "rows " + std::to_string(y) + " to " + std::to_string(y + rows - 1) +
                                        ": " + input->error());
-            for (const float value : part.values())
-                hash_ = (hash_ ^ std::bit_cast<std::uint32_t>(value)) * 1099511628211u;
+            hash_.add(std::as_bytes(std::span(part.values())));
         }
         if (keepOpen_) input_ = std::move(input);
     }
@@ -167,7 +166,7 @@ class FlatImages::Source {
     const std::vector<std::string>& names() const { return names_; }
     Window data() const { return info().data; }
     Window display() const { return info().display; }
-    std::uint64_t hash() const { return hash_; }
+    std::uint64_t hash() const { return hash_.value(); }
 
   private:
     struct Place {
@@ -182,7 +181,7 @@ class FlatImages::Source {
     std::vector<std::string> names_;
     std::vector<Place> places_;  // of each name
     std::vector<Place> taken_;
-    std::uint64_t hash_ = 14695981039346656037u;  // of all values read, FNV-1a
+    ContentHash hash_;  // of all values read
 };
 
 FlatImages::FlatImages(std::vector<std::string> paths) {

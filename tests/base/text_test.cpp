@@ -24,6 +24,11 @@ TEST(Text, PrintableHasNothingThatATerminalObeys) {
     EXPECT_EQ(printable("a\nb\tc", "\n"), "a\nb?c");
 }
 
+TEST(Text, HexHasSixteenDigits) {
+    EXPECT_EQ(hexText(0), "0000000000000000");
+    EXPECT_EQ(hexText(0xfedcba9876543210u), "fedcba9876543210");
+}
+
 TEST(Luminance, WhiteIsOne) {
     EXPECT_DOUBLE_EQ(luminance(1.0, 1.0, 1.0), 1);
     EXPECT_FLOAT_EQ(luminance(0.f, 2.f, 0.f), 2 * 0.7152f);

@@ -14,6 +14,7 @@
 #include "sweep/sweep_plan.h"
 #include "sweep/sweep_store.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/text.h"
@@ -255,7 +256,10 @@ class Runner {
     }
 
     std::string inspectionKey(const SweepRecord& record) const {
-        return hexText(textHash(record.key + " inspect " + std::to_string(plan_.options.inspectedRegions)));
+        return Fingerprint()
+            .add("image", record.key)
+            .add("inspect", std::to_string(plan_.options.inspectedRegions))
+            .text();
     }
 
     const SweepRecord* doneInspection(const SweepRecord& record) const {

@@ -5,8 +5,8 @@
 #include <sstream>
 #include <utility>
 
-#include "sweep/sweep_store.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/text.h"
 
 namespace vlx {
@@ -40,7 +40,7 @@ std::string namedFiles(const std::string& command) {
     std::istringstream words(command);
     std::error_code ignored;
     for (std::string word; words >> word;)
-        if (fs::is_regular_file(word, ignored)) identities += fileIdentity(word);
+        if (fs::is_regular_file(word, ignored)) identities += fileFingerprint(word);
     return identities;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,5 +20,8 @@ std::string printable(std::string text, std::string_view kept = {});
 
 /// One number by a format of printf; at most 63 characters.
 std::string formatted(const char* format, double value);
+
+/// 16 hexadecimal digits.
+std::string hexText(std::uint64_t value);
 
 }  // namespace vlx
