@@ -21,7 +21,9 @@ struct RawAttribute {
     std::size_t end = 0;
 };
 
-/// Goes over the bytes of an OpenEXR header without trusting a size in them.
+/// Goes over the bytes of an OpenEXR header without trusting a size in them. OpenEXRCore 3.1.5 cannot do it:
+/// it refuses every file of deep and flat parts, as dumps are and OpenEXR itself writes them ("'version'
+/// attribute for deep file not found"), and believes windows that the file is too short for.
 class HeaderWalker {
   public:
     /// `bytes` are the first of a file of `fileBytes` bytes, perhaps not all of its header; `path` is for
