@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <new>
 #include <set>
-#include <sstream>
 
 #include "tool_main.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -38,8 +38,7 @@ std::vector<int> parseFrames(const std::string& text) {
         "--frames", "expected frames such as 1-100x2 or 1-3,7,10-20x5, found '" + text + "'");
     std::vector<int> frames;
     std::set<int> seen;
-    std::istringstream parts(text + ",");
-    for (std::string part; std::getline(parts, part, ',');) {
+    for (const std::string& part : split(text, ',')) {
         std::string_view rest = part;
         int first = 0, step = 1;
         if (!takeNumber(rest, first)) throw broken;

@@ -38,7 +38,7 @@ struct ImportCommand {
     // Whether the dump is there and made of these files, which `fileOptions` name.
     bool finished(const std::set<std::string>& fileOptions, const std::vector<std::string>& files) {
         checkOutputName(dump, files);
-        inputs = inputsOf(*commandLine, fileOptions, files);
+        inputs = fingerprintOf(*commandLine, fileOptions, files).text();
         return !overwrite && isFinished({dump}, inputs);
     }
     int print(const ImportReport& report, const std::string& what) const {

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "variolux/base/text.h"
+
 namespace vlx {
 
 namespace {
@@ -107,9 +109,7 @@ std::string progressRecord(LogFormat format, const std::string& label, double fr
                            double peakMegabytes) {
     fraction = std::clamp(fraction, 0.0, 1.0);
     if (format == LogFormat::OpenJd) {
-        char percent[32];
-        std::snprintf(percent, sizeof percent, "%.1f", fraction * 100);
-        return "openjd_status: " + label + "\nopenjd_progress: " + percent + "\n";
+        return "openjd_status: " + label + "\nopenjd_progress: " + formatted("%.1f", fraction * 100) + "\n";
     }
     const auto rounded = [](double value, double unit) { return std::round(value / unit) * unit; };
     nlohmann::ordered_json record = {{"event", "progress"},

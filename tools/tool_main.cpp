@@ -20,6 +20,7 @@
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -79,15 +80,8 @@ void logEnd(int code, const std::string& message) {
     printRecord(record);
 }
 
-// Messages quote names out of files, which may hold what a terminal would obey.
-std::string printable(std::string message) {
-    for (char& c : message)
-        if ((static_cast<unsigned char>(c) < 32 && c != '\n') || c == 127) c = '?';
-    return message;
-}
-
 int fail(const CLI::App& app, const std::string& text) {
-    const std::string message = printable(text);
+    const std::string message = printable(text, "\n");
     if (logFormat() != LogFormat::Json)
         std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), message.c_str());
     logEnd(kFailed, message);
@@ -209,7 +203,7 @@ void warn(const std::string& text) {
     if (logFormat() == LogFormat::Json)
         printRecord({{"event", "message"}, {"message", text}});
     else
-        std::fprintf(stderr, "%s\n", printable(text).c_str());
+        std::fprintf(stderr, "%s\n", printable(text, "\n").c_str());
 }
 
 CLI::Validator finiteWithin(double low, double high) {

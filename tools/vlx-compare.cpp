@@ -174,18 +174,15 @@ std::vector<std::string> pictureFiles(const Options& options) {
 }
 
 /// Of all that the pictures are made of: images, and how they are called.
-InputsHash pictureInputs(const Options& options, const std::vector<std::string>& names) {
-    InputsHash hash(*options.commandLine, {"REFERENCE", "IMAGE"});
-    hash.addFile(options.reference);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-        hash.add("name", names[i]);
-        hash.addFile(options.images[i]);
-    }
-    return hash;
+Fingerprint pictureInputs(const Options& options, const std::vector<std::string>& names) {
+    Fingerprint made = fingerprintOf(*options.commandLine, {"REFERENCE", "IMAGE"});
+    made.addFile(options.reference);
+    for (std::size_t i = 0; i < names.size(); ++i) made.add("name", names[i]).addFile(options.images[i]);
+    return made;
 }
 
 void writePictures(const Options& options, const PictureOptions& picture, const Input& reference,
-                   const std::vector<Input>& inputs, const Report& report, const InputsHash& hash) {
+                   const std::vector<Input>& inputs, const Report& report, const Fingerprint& made) {
     std::vector<CaptionedImage> images;
     for (std::size_t i = 0; i < inputs.size(); ++i) {
         std::array<char, 48> note{};
@@ -200,13 +197,13 @@ void writePictures(const Options& options, const PictureOptions& picture, const 
                                    relativeErrors(reference.colour, images)};
     if (!picture.crops.empty()) pictures.push_back(enlargedCrops(all, picture));
 
-    hash.checkUnchanged();
+    made.checkUnchanged();
     std::error_code status;
     std::filesystem::create_directories(options.pictures, status);
     if (status) throw Error(options.pictures, "expected to make this folder: " + status.message());
     const std::vector<std::string> files = pictureFiles(options);
     ImageWriteOptions write;
-    write.attributes[kInputsAttribute] = hash.text();
+    write.attributes[kInputsAttribute] = made.text();
     for (std::size_t i = 0; i < files.size(); ++i) writeImage(files[i], pictures[i], write);
 }
 
@@ -230,10 +227,10 @@ int run(const Options& options) {
     const ThreadLimit threads(options.threads);
 
     const std::vector<std::string> names = shortNames(options.images);
-    std::optional<InputsHash> hash;  // of the pictures that are to be made
+    std::optional<Fingerprint> made;  // of the pictures that are to be made
     if (!options.pictures.empty()) {
-        hash = pictureInputs(options, names);
-        if (!options.overwrite && isFinished(pictureFiles(options), hash->text())) hash.reset();
+        made = pictureInputs(options, names);
+        if (!options.overwrite && isFinished(pictureFiles(options), made->text())) made.reset();
     }
 
     const Input reference = readInput(options.reference, options, options.referenceStddev);
@@ -256,7 +253,7 @@ int run(const Options& options) {
         report.images.push_back(std::move(entry));
         layerFound = layerFound || input.layerFound;
         stddevFound = stddevFound || input.stddev;
-        if (hash) inputs.push_back(std::move(input));
+        if (made) inputs.push_back(std::move(input));
     }
     if (!options.layer.empty() && !layerFound)
         throw Error(options.layer, "expected a layer of this name in at least one file, found none");
@@ -264,7 +261,7 @@ int run(const Options& options) {
         throw Error("--stddev", "expected an image with channels stddev.R, stddev.G, stddev.B, found none");
     report.violations = checkLimits(report, limits);
 
-    if (hash) writePictures(options, picture, reference, inputs, report, *hash);
+    if (made) writePictures(options, picture, reference, inputs, report, *made);
     if (options.json || !isQuiet())
         std::fputs((options.json ? toJson(report) : toText(report)).c_str(), stdout);
     if (report.violations.empty()) return kDone;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -69,11 +68,6 @@ vlx::ChannelMap replacedLayers(const vlx::KrigeOptions& o, const std::string& or
     return map;
 }
 
-void writeText(const vlx::OutputFile& file, const std::string& text) {
-    std::ofstream stream(file.temporaryPath(), std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw vlx::Error(file.path(), "writing failed");
 }
 
 std::string inWords(const vlx::Window& w) {
@@ -129,13 +123,9 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     if (!o.samplingMap.empty() && !o.samplingMap.ends_with(".exr"))
         throw CLI::ValidationError("--sampling-map",
                                    "expected a name that ends with .exr, found '" + o.samplingMap + "'");
-    vlx::InputsHash hash(*o.commandLine,
-                         {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"});
-    for (const std::string& file : files) {
-        hash.add("file", file.empty() ? "none" : "given");  // which of them
-        hash.addFile(file);
-    }
-    const std::string inputs = write.attributes[vlx::kInputsAttribute] = hash.text(o.krige.band);
+    const vlx::Fingerprint made = vlx::fingerprintOf(
+        *o.commandLine, {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"}, files);
+    const std::string inputs = write.attributes[vlx::kInputsAttribute] = made.text(o.krige.band);
     std::vector<std::string> outputs = {o.image};
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
     if (o.diagnostics) outputs.push_back(diagnosticsName);
@@ -163,17 +153,17 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
         report = vlx::reconstruct(
             dump, method, [&](const float* rows, int count) { writer.write(rows, count); }, progress);
-        hash.checkUnchanged();
+        made.checkUnchanged();
         writer.close();
     } else {
         vlx::Reconstruction result = vlx::reconstruct(dump, method, progress);
         result.image = vlx::applyPixelFilter(result.image, o.filter);
-        hash.checkUnchanged();
+        made.checkUnchanged();
         const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
         if (o.diagnostics) vlx::addDiagnosticLayers(result);
         // Both files or none: the image gets its name only when the JSON is complete.
         std::optional<vlx::OutputFile> diagnostics;
-        if (o.diagnostics) writeText(diagnostics.emplace(diagnosticsName), vlx::toJson(result));
+        if (o.diagnostics) diagnostics.emplace(diagnosticsName).write(vlx::toJson(result));
         if (original.empty())
             vlx::writeImage(o.image, result.image, write);
         else

@@ -69,7 +69,7 @@ struct SampleCommand {
 
     int run() {
         vlx::checkOutputName(dump, {image});
-        options.inputs = vlx::inputsOf(*commandLine, {}, {image});
+        options.inputs = vlx::fingerprintOf(*commandLine, {}, {image}).text();
         if (!overwrite && vlx::isFinished({dump}, options.inputs)) return vlx::kDone;
         vlx::sampleAtPoints(image, dump, options);
         return vlx::kDone;
@@ -109,7 +109,7 @@ struct SubsetCommand {
 
     int run() {
         vlx::checkOutputName(dump, {input});
-        options.inputs = vlx::inputsOf(*commandLine, {"DUMP"}, {input});
+        options.inputs = vlx::fingerprintOf(*commandLine, {"DUMP"}, {input}).text();
         if (!overwrite && vlx::isFinished({dump}, options.inputs)) return vlx::kDone;
         vlx::ProgressBar bar("dividing");
         vlx::subsetDump(input, dump, options, bar);
@@ -156,7 +156,7 @@ struct MergeCommand {
     std::string inputs() const {
         const std::string whole = options.crop ? std::string() : vlx::wholeInputs(parts);
         if (!whole.empty()) return whole;
-        return vlx::inputsOf(*commandLine, {"PART"}, parts);
+        return vlx::fingerprintOf(*commandLine, {"PART"}, parts).text();
     }
 };
 

@@ -26,13 +26,14 @@ namespace {
 using namespace vlx::render;
 
 /// Of what variolux:inputs is to say.
-vlx::InputsHash inputs(const TraceOptions& o) {
-    vlx::InputsHash hash(*o.commandLine, {"SCENE", "--env", "--append", "--sample-map"});
-    hash.add("scene", std::filesystem::path(o.scene).filename().string());  // it is in the header
-    if (o.frame) hash.add("frame", std::to_string(*o.frame));
-    for (const std::string& file : gltfFiles(o.scene)) hash.addFile(file);
-    for (const std::string& file : {o.environment.image, o.earlierPath, o.mapPath}) hash.addFile(file);
-    return hash;
+vlx::Fingerprint inputs(const TraceOptions& o) {
+    vlx::Fingerprint made =
+        vlx::fingerprintOf(*o.commandLine, {"SCENE", "--env", "--append", "--sample-map"});
+    made.add("scene", std::filesystem::path(o.scene).filename().string());  // it is in the header
+    if (o.frame) made.add("frame", std::to_string(*o.frame));
+    for (const std::string& file : gltfFiles(o.scene)) made.addFile(file);
+    for (const std::string& file : {o.environment.image, o.earlierPath, o.mapPath}) made.addFile(file);
+    return made;
 }
 
 IntegratorChoice chooseIntegrator(const TraceOptions& o, const Scene& loaded,
@@ -90,9 +91,9 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     if (o.environmentConstant.size() == 3)
         o.environment.constant =
             Rgb{o.environmentConstant[0], o.environmentConstant[1], o.environmentConstant[2]};
-    std::optional<vlx::InputsHash> hash;
+    std::optional<vlx::Fingerprint> made;
     if (renders) {
-        o.render.inputs = hash.emplace(inputs(o)).text(o.render.band);
+        o.render.inputs = made.emplace(inputs(o)).text(o.render.band);
         if (!o.overwrite && vlx::isFinished({o.dump}, o.render.inputs)) return printSkipped(o);
     }
     if (o.listCameras) return printCameras(o, loadCameras(o.scene, exposure));
@@ -125,7 +126,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
         note(o, "integrator " + o.render.integratorReason);
 
     if (o.timeLimit > 0 || o.targetError > 0) chooseSamples(o, loaded, accelerator);
-    hash->checkUnchanged();  // all is read but the dump that is added to, which stays open
+    made->checkUnchanged();  // all is read but the dump that is added to, which stays open
     const RenderReport report = renderDump(loaded, accelerator, o.dump, o.render, progress);
     if (report.nonFinite > 0)
         note(o, "warning: " + std::to_string(report.nonFinite) +

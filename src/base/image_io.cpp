@@ -100,7 +100,7 @@ Image readImage(const std::string& path) {
     while (input->info().deep)
         if (!input->seek(++part)) throw Error(path, "expected a flat image, found only deep samples");
 
-    const ImageInfo info = input->info();
+    const ImageInfo& info = input->info();
     const Window& data = info.data;
     const auto channels = static_cast<int>(info.channels.size());
     if (data.width <= 0 || data.height <= 0 || channels <= 0 || info.depth > 1)
@@ -224,11 +224,7 @@ struct OtherWriter : RowWriter {
     }
     void finish() override {
         if (!output->close()) fail(output->error());
-        std::ofstream bytes(file.temporaryPath(), std::ios::binary);
-        bytes.write(reinterpret_cast<const char*>(output->memory().data()),
-                    static_cast<std::streamsize>(output->memory().size()));
-        bytes.close();
-        if (!bytes) throw Error(file.path(), "writing to disk failed");
+        file.write({reinterpret_cast<const char*>(output->memory().data()), output->memory().size()});
     }
 };
 
@@ -243,7 +239,7 @@ ImageWriter::ImageWriter(const std::string& path, const Window& data, const Wind
     : impl_(new Impl) {
     std::string extension = std::filesystem::path(path).extension().string();
     for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (extension == ".exr")
+    if (extension == ".exr" || extension == ".sxr" || extension == ".mxr")  // OpenEXR's names
         impl_->rows = std::make_unique<ExrWriter>(path, data, display, channels, options);
     else
         impl_->rows = std::make_unique<OtherWriter>(path, data, display, channels, options);

@@ -36,7 +36,7 @@ struct ImageInfo {
 class ImageInput {
   public:
     virtual ~ImageInput() = default;
-    virtual ImageInfo info() const = 0;  ///< of the part sought last
+    virtual const ImageInfo& info() const = 0;  ///< of the part sought last, until the next is sought
     virtual bool seek(int part) = 0;
     /// Channels [begin, end) of the rows [y, until), interleaved; of whole rows of tiles.
     virtual bool readRows(int part, int y, int until, int begin, int end, float* out) = 0;

@@ -49,11 +49,16 @@ class Input : public ImageInput {
   public:
     /// `memory`: what `input` reads from, if it does.
     Input(std::unique_ptr<OIIO::ImageInput> input, std::unique_ptr<OIIO::Filesystem::IOProxy> memory)
-        : memory_(std::move(memory)), input_(std::move(input)) {}
+        : memory_(std::move(memory)),
+          input_(std::move(input)),
+          info_(infoOf(input_->spec(), input_->format_name())) {}
 
-    ImageInfo info() const override { return infoOf(input_->spec(), input_->format_name()); }
+    const ImageInfo& info() const override { return info_; }
     bool seek(int part) override {
-        if (input_->seek_subimage(part, 0)) return true;
+        if (input_->seek_subimage(part, 0)) {
+            info_ = infoOf(input_->spec(), input_->format_name());
+            return true;
+        }
         static_cast<void>(input_->geterror());  // there is no such part: not an error
         return false;
     }
@@ -81,6 +86,7 @@ class Input : public ImageInput {
   private:
     std::unique_ptr<OIIO::Filesystem::IOProxy> memory_;
     std::unique_ptr<OIIO::ImageInput> input_;
+    ImageInfo info_;  // of the part sought last: asked for often, in loops over rows
 };
 
 class Output : public ImageOutput {

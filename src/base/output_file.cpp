@@ -9,6 +9,7 @@
 #include <climits>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "variolux/base/error.h"
 
@@ -77,6 +78,13 @@ OutputFile::~OutputFile() {
     leaveSlot(slot_);
 }
 
+void OutputFile::write(std::string_view bytes) const {
+    std::ofstream stream(temporary_, std::ios::binary);
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    stream.close();
+    if (!stream) throw Error(path_, "writing to disk failed");
+}
+
 void OutputFile::commit() {
     const int descriptor = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0)
@@ -89,6 +97,12 @@ void OutputFile::commit() {
         throw Error(path_,
                     std::string("expected to give the finished file its name: ") + std::strerror(errno));
     committed_ = true;
+}
+
+void writeFile(const std::string& path, std::string_view bytes) {
+    OutputFile file(path);
+    file.write(bytes);
+    file.commit();
 }
 
 void removeUnfinishedFiles() noexcept {

@@ -8,6 +8,7 @@
 #include "compare/ssim.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -83,12 +84,6 @@ double trimmedMean(std::vector<double> values) {
             ++below;
         }
     return (sum + static_cast<double>(kept - below) * highest) / static_cast<double>(kept);
-}
-
-std::string listed(const std::vector<std::string>& names) {
-    std::string text;
-    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-    return text;
 }
 
 }  // namespace

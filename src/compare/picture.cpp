@@ -4,13 +4,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 
 #include "compare/canvas.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/parallel.h"
+#include "variolux/base/text.h"
 #include "variolux/compare/colour_map.h"
 
 namespace vlx {
@@ -208,11 +208,7 @@ void drawLegend(Image& canvas, const Legend& legend, bool nonFinite) {
     }
 }
 
-std::string number(double value, bool sign) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), sign && value != 0 ? "%+g" : "%g", value);
-    return text.data();
-}
+std::string number(double value, bool sign) { return formatted(sign && value != 0 ? "%+g" : "%g", value); }
 
 }  // namespace
 

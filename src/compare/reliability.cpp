@@ -1,6 +1,7 @@
 #include "variolux/compare/reliability.h"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
 
@@ -14,14 +15,7 @@ struct Scored {
 };
 
 /// q with P(|z| <= q) = level for a standard normal z.
-double normalQuantile(double level) {
-    double low = 0, high = 10;
-    for (int i = 0; i < 60; ++i) {
-        const double middle = (low + high) / 2;
-        (std::erf(middle / std::sqrt(2.0)) < level ? low : high) = middle;
-    }
-    return low;
-}
+double normalQuantile(double level) { return boost::math::quantile(boost::math::normal(), (1 + level) / 2); }
 
 std::vector<Scored> usableValues(const Image& reference, const Image& image, const Image& stddev,
                                  const std::optional<Image>& referenceStddev) {

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -19,12 +19,6 @@ bool isCount(Metric metric) { return metric == Metric::NonFinite || metric == Me
 
 /// What limits and rankings look at.
 double judged(Metric metric, double value) { return metric == Metric::Bias ? std::abs(value) : value; }
-
-std::string formatted(const char* format, double value) {
-    std::array<char, 64> text{};
-    std::snprintf(text.data(), text.size(), format, value);
-    return text.data();
-}
 
 std::string cell(Metric metric, double value) {
     if (std::isnan(value)) return "n/a";

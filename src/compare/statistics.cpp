@@ -1,10 +1,10 @@
 #include "variolux/compare/statistics.h"
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 namespace vlx {
@@ -12,19 +12,6 @@ namespace vlx {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-/// P(|T| <= t), Abramowitz and Stegun 26.7.3 (odd degrees) and 26.7.4 (even).
-double studentProbability(double t, int degrees) {
-    const double theta = std::atan(t / std::sqrt(degrees));
-    const double cosine = std::cos(theta), square = cosine * cosine;
-    const bool odd = degrees % 2 == 1;
-    double term = odd ? cosine : 1, sum = 0;
-    for (int k = odd ? 1 : 0; k <= degrees - 2; k += 2) {
-        sum += term;
-        term *= square * (k + 1) / (k + 2);
-    }
-    return odd ? 2 / std::numbers::pi * (theta + std::sin(theta) * sum) : std::sin(theta) * sum;
-}
 
 double mean(std::span<const double> values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
@@ -46,12 +33,7 @@ double varianceBetween(const CurvePoint& a, const CurvePoint& b, double t) {
 
 double studentQuantile95(int degrees) {
     assert(degrees >= 1);
-    double low = 0, high = 20;  // 12.7 with one degree
-    while (high - low > 1e-10) {
-        const double middle = (low + high) / 2;
-        (studentProbability(middle, degrees) < 0.95 ? low : high) = middle;
-    }
-    return (low + high) / 2;
+    return boost::math::quantile(boost::math::students_t(degrees), 0.975);
 }
 
 Interval meanInterval(std::span<const double> values) {

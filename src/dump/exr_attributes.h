@@ -3,6 +3,7 @@
 #include <set>
 #include <string>
 
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 
 /// Names of the attributes of a dump's headers; what they hold is in FORMAT.md.

@@ -23,6 +23,7 @@
 #include "dump/exr_attributes.h"
 #include "exr/header_walker.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/splats.h"
 
 namespace vlx {
@@ -71,13 +72,7 @@ Imf::Header parse(const std::string& path, const Bytes& bytes, const std::vector
 }
 
 Window toWindow(const std::string& path, const char* what, const Imath::Box2i& box) {
-    const std::int64_t width = std::int64_t{box.max.x} - box.min.x + 1;
-    const std::int64_t height = std::int64_t{box.max.y} - box.min.y + 1;
-    if (!isPossible(box.min.x, box.min.y, width, height))
-        throw Error(path, std::string("expected a ") + what + " of pixels within 2^30 of 0, found " +
-                              std::to_string(width) + " x " + std::to_string(height) + " pixels at (" +
-                              std::to_string(box.min.x) + ", " + std::to_string(box.min.y) + ")");
-    return {box.min.x, box.min.y, static_cast<int>(width), static_cast<int>(height)};
+    return checkedWindow(path, what, box.min.x, box.min.y, box.max.x, box.max.y);
 }
 
 DumpCompression toCompression(const std::string& path, Imf::Compression compression) {
@@ -139,16 +134,6 @@ std::optional<std::vector<float>> matrix(const Imf::Header& header, const std::s
     return std::vector<float>(&found->x[0][0], &found->x[0][0] + 16);
 }
 
-std::vector<std::string> split(const std::string& text) {
-    std::vector<std::string> parts;
-    for (std::size_t begin = 0; begin < text.size();) {
-        const std::size_t end = std::min(text.find(',', begin), text.size());
-        if (end > begin) parts.push_back(text.substr(begin, end - begin));
-        begin = end + 1;
-    }
-    return parts;
-}
-
 DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
     DumpHeader dump;
     dump.data = toWindow(path, "data window", header.dataWindow());
@@ -161,7 +146,8 @@ DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
                         .value_or(value<std::string>(header, "Software").value_or(std::string()));
     dump.scene = value<std::string>(header, kScene).value_or(std::string());
     dump.pixelFilter = value<std::string>(header, kPixelFilter).value_or(std::string());
-    dump.effects = split(value<std::string>(header, kEffects).value_or(std::string()));
+    dump.effects = split(value<std::string>(header, kEffects).value_or(std::string()), ',');
+    std::erase(dump.effects, "");
     if (const auto text = value<std::string>(header, kSeed)) {
         std::int64_t seed = 0;
         const auto [end, status] = std::from_chars(text->data(), text->data() + text->size(), seed);

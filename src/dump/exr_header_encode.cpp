@@ -20,6 +20,7 @@
 #include "exr/header_walker.h"
 #include "exr/little_endian.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/splats.h"
 
 namespace vlx {
@@ -67,12 +68,6 @@ Imf::PixelType fromType(ChannelType type) {
         default:
             return Imf::FLOAT;
     }
-}
-
-std::string joined(const std::vector<std::string>& parts) {
-    std::string text;
-    for (const auto& part : parts) text += (text.empty() ? "" : ",") + part;
-    return text;
 }
 
 }  // namespace
@@ -153,7 +148,7 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
         text(kRenderer, dump.renderer);
         text(kScene, dump.scene);
         text(kPixelFilter, dump.pixelFilter);
-        text(kEffects, joined(dump.effects));
+        text(kEffects, listed(dump.effects, ","));
         if (dump.replicatesShare) samples.insert(kReplicatesShare, Imf::IntAttribute(1));
         if (dump.seed) text(kSeed, std::to_string(*dump.seed));
         if (dump.samples) samples.insert(kSamples, Imf::DoubleAttribute(*dump.samples));

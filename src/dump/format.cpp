@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 
 namespace vlx {

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -20,11 +21,7 @@ float median(std::vector<float> values) {
     return *middle;
 }
 
-std::string number(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g", value);
-    return text;
-}
+std::string number(double value) { return formatted("%.3g", value); }
 
 std::string tenths(double value) { return number(std::round(value * 10) / 10 + 0.0); }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "dump/exr_header.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/layers.h"
 #include "variolux/dump/reader.h"
 
@@ -51,25 +52,12 @@ std::vector<MissingPart> findMissing(const DumpInfo& info) {
     return missing;
 }
 
-// Text of a file's header may hold anything: nothing that a terminal would obey.
-std::string printable(std::string text) {
-    for (char& c : text)
-        if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
-    return text;
-}
-
-std::string numberText(double value, const char* format) {
-    char text[64];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
-
 std::string bytesText(std::uint64_t bytes) {
     if (bytes < 10'000) return std::to_string(bytes) + " bytes";
     const auto value = static_cast<double>(bytes);
-    if (bytes < 1'000'000) return numberText(value * 1e-3, "%.1f kB");
-    if (bytes < 1'000'000'000) return numberText(value * 1e-6, "%.1f MB");
-    return numberText(value * 1e-9, "%.2f GB");
+    if (bytes < 1'000'000) return formatted("%.1f kB", value * 1e-3);
+    if (bytes < 1'000'000'000) return formatted("%.1f MB", value * 1e-6);
+    return formatted("%.2f GB", value * 1e-9);
 }
 
 }  // namespace
@@ -136,7 +124,7 @@ std::string toText(const DumpInfo& info) {
          windowText(header.data) +
              (header.display == header.data ? "" : ", of a picture of " + windowText(header.display)));
     line("samples", std::to_string(info.samples) + "; a pixel has " + std::to_string(info.minSamples) +
-                        " (least), " + numberText(info.meanSamples, "%.2f") + " (mean), " +
+                        " (least), " + formatted("%.2f", info.meanSamples) + " (mean), " +
                         std::to_string(info.maxSamples) + " (most)");
     line("not finite", std::to_string(info.nonFiniteSamples) + " samples");
     if (const std::string where = toText(info.positions); !where.empty()) line("WARNING", where);
@@ -147,18 +135,16 @@ std::string toText(const DumpInfo& info) {
         info.rawBytes > 0 ? 100.0 * static_cast<double>(info.fileBytes) / static_cast<double>(info.rawBytes)
                           : 100.0;
     line("file", bytesText(info.fileBytes) + ", compression " + compressionText(header.compression) + ", " +
-                     numberText(share, "%.0f %%") + " of the samples' " + bytesText(info.rawBytes));
+                     formatted("%.0f %%", share) + " of the samples' " + bytesText(info.rawBytes));
     std::string names;
     for (const auto& channel : header.channels)
         names += (names.empty() ? "" : ", ") + printable(channel.name) + " (" + typeText(channel.type) + ")";
     line("channels", names);
-    std::string effects;
-    for (const auto& effect : header.effects) effects += (effects.empty() ? "" : ", ") + effect;
-    line("effects", given(effects));
+    line("effects", given(listed(header.effects)));
     line("pixel filter", given(header.pixelFilter));
-    if (header.samples) line("asked for", numberText(*header.samples, "%g samples a pixel"));
+    if (header.samples) line("asked for", formatted("%g samples a pixel", *header.samples));
     if (header.seed) line("seed", std::to_string(*header.seed));
-    if (header.renderSeconds) line("traced in", numberText(*header.renderSeconds, "%.2f s"));
+    if (header.renderSeconds) line("traced in", formatted("%.2f s", *header.renderSeconds));
     if (header.splatReplicates > 0)
         line("splats", "of " + std::to_string(header.splatReplicates) +
                            " replicates; reading adds them to the samples of their replicate");

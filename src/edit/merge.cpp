@@ -11,7 +11,9 @@
 #include "exr/part_layout.h"
 #include "exr/raw_file.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
 
@@ -35,11 +37,7 @@ std::string text(const std::string& value) { return "'" + value + "'"; }
 std::string text(int value) { return std::to_string(value); }
 std::string text(const std::optional<std::int64_t>& value) { return value ? std::to_string(*value) : "none"; }
 std::string text(const std::optional<double>& value) { return value ? std::to_string(*value) : "none"; }
-std::string text(const std::vector<std::string>& values) {
-    std::string all;
-    for (const auto& value : values) all += (all.empty() ? "" : ", ") + value;
-    return "'" + all + "'";
-}
+std::string text(const std::vector<std::string>& values) { return "'" + listed(values) + "'"; }
 std::string text(const std::optional<std::vector<float>>& value) { return value ? "another matrix" : "none"; }
 
 std::vector<std::string> channelTexts(const DumpHeader& header) {
@@ -160,19 +158,18 @@ std::string wholeInputs(const std::vector<std::string>& parts) {
     bool allBands = true;
     for (const std::string& part : parts) {
         const std::string inputs = inputsOf(part);
-        const std::size_t end = inputs.find(" band ");
-        if (end == std::string::npos) {
+        const auto found = wholeOfBand(inputs);
+        if (!found) {
             allBands = false;
             continue;
         }
-        const std::string found = inputs.substr(0, end);
         if (runOf.empty()) {
-            run = found;
+            run = *found;
             runOf = part;
         }
-        if (found != run)
+        if (*found != run)
             throw Error(part, "expected a band of the run " + run + " as " + runOf + " is, found one of " +
-                                  found + ": other inputs or parameters");
+                                  *found + ": other inputs or parameters");
     }
     return allBands ? run : std::string();
 }

@@ -12,7 +12,8 @@ namespace vlx {
 struct MergeOptions {
     /// Parts need only fill a rectangle; else they must fill the whole picture (the display window).
     bool crop = false;
-    /// For the header's kInputsAttribute (base/image_io.h) where wholeInputs() says nothing, and for crops.
+    /// For the header's kInputsAttribute (base/fingerprint.h) where wholeInputs() says nothing, and for
+    /// crops.
     std::string inputs = {};
 };
 

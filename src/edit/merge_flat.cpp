@@ -1,17 +1,16 @@
 #include "edit/merge_flat.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <memory>
 
 #include "base/image_library.h"
-#include "exr/flat_header.h"
 #include "exr/flat_images.h"
 #include "exr/part_layout.h"
 #include "variolux/base/error.h"
-#include "variolux/base/image_io.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/output_file.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -22,17 +21,8 @@ constexpr int kBandRows = 16;
 constexpr std::uint64_t kMaxBandBytes = std::uint64_t{1} << 31;
 
 std::unique_ptr<ImageInput> open(const std::string& path) {
-    std::error_code status;
-    if (!std::filesystem::is_regular_file(path, status))
-        throw Error(path, "expected an image, found no such file");
-    checkFlatHeader(path);
-    std::string fault;
-    auto input = imageLibrary().open(path, fault);
-    if (!input) throw Error(path, "expected an image: " + fault);
-    const ImageInfo info = input->info();
-    if (info.data.width <= 0 || info.data.height <= 0 || info.channels.empty() || info.depth > 1 ||
-        info.tileWidth > 0)
-        throw Error(path, "expected an image of scanlines");
+    auto input = openFlat(path);
+    if (input->info().tileWidth > 0) throw Error(path, "expected an image of scanlines");
     return input;
 }
 
@@ -55,12 +45,12 @@ std::string flatInputs(const std::string& path) { return open(path)->info().text
 MergeReport mergeFlat(const std::vector<std::string>& paths, const std::string& output,
                       const MergeOptions& options, const Progress& progress) {
     const std::unique_ptr<ImageInput> first = open(paths.front());
-    const ImageInfo info = first->info();
+    const ImageInfo& info = first->info();
     std::vector<PicturePart> parts;
     for (const auto& path : paths) {
-        const ImageInfo part = open(path)->info();
-        checkSamePicture(paths.front(), info, path, part);
-        parts.push_back({path, part.data});
+        const std::unique_ptr<ImageInput> part = open(path);
+        checkSamePicture(paths.front(), info, path, part->info());
+        parts.push_back({path, part->info().data});
     }
     const Window whole = options.crop ? boundsOf(parts) : info.display;
     arrangeParts(parts, whole, output);

@@ -13,7 +13,7 @@ struct SubsetOptions {
     std::uint32_t part = 0;     ///< which of the disjoint sub-sets of this size, from 0
     std::uint64_t seed = 0;     ///< another seed, another division into sub-sets
     DumpCompression compression = DumpCompression::Rle;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 struct SubsetReport {

@@ -9,7 +9,6 @@
 #include "exr/little_endian.h"
 #include "exr/raw_file.h"
 #include "variolux/base/error.h"
-#include "variolux/base/window.h"
 
 namespace vlx {
 
@@ -37,10 +36,10 @@ class PartCheck {
         : path_(path), bytes_(bytes), attributes_(attributes) {}
 
     void operator()(std::uint64_t fileBytes) const {
-        checkedWindow("displayWindow");
-        const Window window = checkedWindow("dataWindow");
-        const auto columns = static_cast<std::uint64_t>(window.width),
-                   rows = static_cast<std::uint64_t>(window.height);
+        window("displayWindow");
+        const Window data = window("dataWindow");
+        const auto columns = static_cast<std::uint64_t>(data.width),
+                   rows = static_cast<std::uint64_t>(data.height);
         std::uint64_t chunks = 0, pixels = columns * rows;  // both factors are below 2^31
         const unsigned char compression = *value("compression", "compression", 1);
         if (findAttribute(attributes_, "tiles") != nullptr) {
@@ -66,16 +65,10 @@ class PartCheck {
     }
 
   private:
-    Window checkedWindow(const char* name) const {
+    Window window(const char* name) const {
         std::array<std::int32_t, 4> corners{};
         std::memcpy(corners.data(), value(name, "box2i", 16), sizeof corners);
-        const std::int64_t width = std::int64_t{corners[2]} - corners[0] + 1;
-        const std::int64_t height = std::int64_t{corners[3]} - corners[1] + 1;
-        if (!isPossible(corners[0], corners[1], width, height))
-            throw Error(path_, std::string("expected a ") + name + " of pixels within 2^30 of 0, found " +
-                                   std::to_string(width) + " x " + std::to_string(height) + " pixels at (" +
-                                   std::to_string(corners[0]) + ", " + std::to_string(corners[1]) + ")");
-        return {corners[0], corners[1], static_cast<int>(width), static_cast<int>(height)};
+        return checkedWindow(path_, name, corners[0], corners[1], corners[2], corners[3]);
     }
 
     const unsigned char* value(const char* name, const char* type, std::size_t bytes) const {

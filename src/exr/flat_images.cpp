@@ -1,14 +1,15 @@
 #include "exr/flat_images.h"
 
 #include <algorithm>
-#include <bit>
 #include <filesystem>
 #include <limits>
 
 #include "base/image_library.h"
 #include "exr/flat_header.h"
 #include "variolux/base/error.h"
+#include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -30,7 +31,9 @@ void checkRowLength(const std::string& path, const ImageInfo& info) {
                               " pixels of " + std::to_string(channels) + " channels");
 }
 
-std::unique_ptr<ImageInput> open(const std::string& path) {
+}  // namespace
+
+std::unique_ptr<ImageInput> openFlat(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status))
         throw Error(path, "expected an image, found no such file");
@@ -38,20 +41,11 @@ std::unique_ptr<ImageInput> open(const std::string& path) {
     std::string fault;
     auto input = imageLibrary().open(path, fault);
     if (!input) throw Error(path, "expected an image: " + fault);
-    const ImageInfo info = input->info();
+    const ImageInfo& info = input->info();
     if (info.deep) throw Error(path, "expected a flat image, found deep samples: this is a dump already");
     if (info.data.width <= 0 || info.data.height <= 0 || info.channels.empty() || info.depth > 1)
         throw Error(path, "expected a flat image with pixels and channels, found none");
-    checkRowLength(path, info);
     return input;
-}
-
-}  // namespace
-
-std::string listed(const std::vector<std::string>& names) {
-    std::string text;
-    for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-    return text;
 }
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
@@ -124,13 +118,13 @@ class FlatPart {
 class FlatImages::Source {
   public:
     Source(std::string path, bool keepOpen) : path_(std::move(path)), keepOpen_(keepOpen) {
-        auto input = vlx::open(path_);
+        auto input = openFlat(path_);
         for (int number = 0; input->seek(number); ++number) {
-            const ImageInfo info = input->info();
+            const ImageInfo& info = input->info();
             if (number > 0 && (info.deep || info.data != parts_.front().info().data ||
                                info.channels.empty() || info.depth > 1))
                 continue;
-            if (number > 0) checkRowLength(path_, info);
+            checkRowLength(path_, info);
             for (std::size_t channel = 0; channel < info.channels.size(); ++channel) {
                 std::string known = partChannel(number, info.part, info.channels[channel]);
                 if (contains(names_, known)) continue;
@@ -154,13 +148,12 @@ class FlatImages::Source {
 
     void read(int y, int rows) {
         if (taken_.empty()) return;
-        auto input = keepOpen_ ? std::move(input_) : vlx::open(path_);
+        auto input = keepOpen_ ? std::move(input_) : openFlat(path_);
         for (FlatPart& part : parts_) {
             if (!part.read(*input, y, rows))
                 throw Error(path_, "rows " + std::to_string(y) + " to " + std::to_string(y + rows - 1) +
                                        ": " + input->error());
-            for (const float value : part.values())
-                hash_ = (hash_ ^ std::bit_cast<std::uint32_t>(value)) * 1099511628211u;
+            hash_.add(std::as_bytes(std::span(part.values())));
         }
         if (keepOpen_) input_ = std::move(input);
     }
@@ -173,7 +166,7 @@ class FlatImages::Source {
     const std::vector<std::string>& names() const { return names_; }
     Window data() const { return info().data; }
     Window display() const { return info().display; }
-    std::uint64_t hash() const { return hash_; }
+    std::uint64_t hash() const { return hash_.value(); }
 
   private:
     struct Place {
@@ -188,7 +181,7 @@ class FlatImages::Source {
     std::vector<std::string> names_;
     std::vector<Place> places_;  // of each name
     std::vector<Place> taken_;
-    std::uint64_t hash_ = 14695981039346656037u;  // of all values read, FNV-1a
+    ContentHash hash_;  // of all values read
 };
 
 FlatImages::FlatImages(std::vector<std::string> paths) {

@@ -12,8 +12,10 @@
 
 namespace vlx {
 
-/// "a, b, c".
-std::string listed(const std::vector<std::string>& names);
+class ImageInput;
+
+/// A flat image with pixels, whose header was checked before OpenImageIO believes it. Throws Error.
+std::unique_ptr<ImageInput> openFlat(const std::string& path);
 
 bool contains(const std::vector<std::string>& names, const std::string& name);
 

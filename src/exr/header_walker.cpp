@@ -78,4 +78,14 @@ std::optional<std::int32_t> rawInt(const Bytes& bytes, const RawAttribute* attri
     return static_cast<std::int32_t>(loadWord(bytes.data() + attribute->value));
 }
 
+Window checkedWindow(const std::string& path, const std::string& what, std::int64_t x0, std::int64_t y0,
+                     std::int64_t x1, std::int64_t y1) {
+    const std::int64_t width = x1 - x0 + 1, height = y1 - y0 + 1;
+    if (!isPossible(x0, y0, width, height))
+        throw Error(path, "expected a " + what + " of pixels within 2^30 of 0, found " +
+                              std::to_string(width) + " x " + std::to_string(height) + " pixels at (" +
+                              std::to_string(x0) + ", " + std::to_string(y0) + ")");
+    return {static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(width), static_cast<int>(height)};
+}
+
 }  // namespace vlx

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "exr/chunk_codec.h"
+#include "variolux/base/window.h"
 
 namespace vlx {
 
@@ -20,7 +21,9 @@ struct RawAttribute {
     std::size_t end = 0;
 };
 
-/// Goes over the bytes of an OpenEXR header without trusting a size in them.
+/// Goes over the bytes of an OpenEXR header without trusting a size in them. OpenEXRCore 3.1.5 cannot do it:
+/// it refuses every file of deep and flat parts, as dumps are and OpenEXR itself writes them ("'version'
+/// attribute for deep file not found"), and believes windows that the file is too short for.
 class HeaderWalker {
   public:
     /// `bytes` are the first of a file of `fileBytes` bytes, perhaps not all of its header; `path` is for
@@ -57,5 +60,10 @@ std::string rawText(const Bytes& bytes, const RawAttribute* attribute);
 
 /// Value of an integer attribute; nothing when there is none.
 std::optional<std::int32_t> rawInt(const Bytes& bytes, const RawAttribute* attribute);
+
+/// The window of pixels [x0, x1] by [y0, y1], as headers state it. Throws Error, with `what` for its name,
+/// when it is none that can be.
+Window checkedWindow(const std::string& path, const std::string& what, std::int64_t x0, std::int64_t y0,
+                     std::int64_t x1, std::int64_t y1);
 
 }  // namespace vlx

@@ -13,7 +13,7 @@ struct BcdOptions {
     std::uint64_t seed = 0;  ///< likewise
     std::string renderer;
     DumpCompression compression = DumpCompression::Zips;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 /// Whether the file starts as an OpenEXR file does (statistics) rather than as BCD's raw samples. Throws

@@ -5,6 +5,7 @@
 #include "import/channel_presets.h"
 #include "import/moment_rows.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 

@@ -5,6 +5,7 @@
 #include "import/moments.h"
 #include "import/origins.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/writer.h"
 
 namespace vlx {
@@ -26,9 +27,7 @@ struct Agreement {
     }
     std::string text() const {
         const double ratio = given > 0 ? measured / given : 0;
-        char number[32];
-        std::snprintf(number, sizeof number, "%.2g", ratio);
-        std::string note = std::string("The buffers differ by ") + number +
+        std::string note = "The buffers differ by " + formatted("%.2g", ratio) +
                            " times what the variance says (1 is expected, over all pixels).";
         if (!(ratio > 1.0 / 3 && ratio < 3))
             note = "WARNING: " + note + " Is it the variance of the mean of both?";

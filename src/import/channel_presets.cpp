@@ -4,6 +4,7 @@
 
 #include "exr/flat_images.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 

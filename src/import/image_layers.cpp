@@ -26,6 +26,7 @@
 #include "import/channel_presets.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 

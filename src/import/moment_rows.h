@@ -38,7 +38,7 @@ struct MomentOutput {
     bool halves = true;
     std::uint64_t seed = 0;
     DumpCompression compression = DumpCompression::Zips;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 /// The samples that importMoments() describes.

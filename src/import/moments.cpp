@@ -8,6 +8,7 @@
 #include "import/moment_rows.h"
 #include "import/origins.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 

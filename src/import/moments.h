@@ -52,7 +52,7 @@ struct MomentOptions {
     std::uint64_t seed = 0;  ///< of the halves
     std::string renderer;    ///< for the header; from the image's metadata when empty
     DumpCompression compression = DumpCompression::Zips;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 /// Makes a dump of a flat image that has a variance for each pixel.
@@ -86,7 +86,7 @@ struct BufferOptions {
     ChannelMap map;        ///< of both buffers
     std::string renderer;
     DumpCompression compression = DumpCompression::Zips;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 /// Joins half-buffers A and B, each the mean of half of a pixel's samples, into a dump of two samples a

@@ -4,6 +4,7 @@
 
 #include "import/channel_presets.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 

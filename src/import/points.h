@@ -13,7 +13,7 @@ struct PointOptions {
     bool scramble = false;
     std::uint64_t seed = 0;
     DumpCompression compression = DumpCompression::Zips;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 /// Samples an image at the first points of the two-dimensional Sobol sequence over its data window, and

@@ -10,7 +10,7 @@ namespace vlx {
 struct SbmcOptions {
     std::string renderer = "pbrt-v2 (SBMC)";
     DumpCompression compression = DumpCompression::Zips;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 /// Reads sample files of SBMC (Gharbi et al., "Sample-based Monte Carlo Denoising using a Kernel-Splatting

@@ -26,7 +26,7 @@ struct StackOptions {
     std::vector<std::string> radiance = {};
     std::string renderer = {};  ///< for the header; from the first image's metadata when empty
     DumpCompression compression = DumpCompression::Zips;
-    std::string inputs = {};  ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
 };
 
 /// Joins flat images of the same view, rendered with different seeds, into a dump of one sample an image a

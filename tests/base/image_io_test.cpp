@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "base/image_library.h"
 #include "temporary_folder.h"
 #include "variolux/base/error.h"
 
@@ -27,6 +28,20 @@ TEST(ImageIo, ExrKeepsValuesWindowsAndChannelNames) {
     EXPECT_EQ(back.channels, image.channels);
     EXPECT_EQ(back.pixels, image.pixels);
     EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(ImageIo, CompressionIsKeptUnderEveryNameOfOpenExr) {
+    const TemporaryFolder folder;
+    const Image image(Window{0, 0, 7, 4}, {"R", "G", "B"});
+    ImageWriteOptions options;
+    options.compression = "rle";
+    for (const std::string name : {"a.exr", "a.EXR", "a.sxr", "a.mxr"}) {
+        writeImage(folder / name, image, options);
+        std::string fault;
+        const auto file = imageLibrary().open(folder / name, fault);
+        ASSERT_TRUE(file) << fault;
+        EXPECT_EQ(file->info().text("compression"), "rle") << name;
+    }
 }
 
 TEST(ImageIo, PngStoresValuesAsTheyAre) {
@@ -91,8 +106,7 @@ TEST(ImageIo, HugeClaimsOfSmallFilesAreRefused) {
     ImageWriteOptions options;
     options.compression = "none";
     writeImage(folder / "a.exr", Image({0, 0, 4, 4}, {"R", "G", "B"}), options);
-    std::ifstream file(folder / "a.exr", std::ios::binary);
-    std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    std::string bytes = contentsOf(folder / "a.exr");
     for (const std::string name : {"dataWindow", "displayWindow"}) {
         const std::size_t at = bytes.find(name + '\0' + "box2i");
         ASSERT_NE(at, std::string::npos);
@@ -123,11 +137,7 @@ TEST(ImageIo, HugeWindowsAreToldWithTheirSize) {
     const TemporaryFolder folder;
     const std::string path = folder / "huge.exr";
     writeImage(path, Image({0, 0, 4, 4}, {"R", "G", "B"}));
-    std::string bytes;
-    {
-        std::ifstream in(path, std::ios::binary);
-        bytes.assign(std::istreambuf_iterator<char>(in), {});
-    }
+    std::string bytes = contentsOf(path);
     const auto messageOf = [](const std::string& file) {
         try {
             readImage(file);

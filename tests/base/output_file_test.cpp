@@ -38,6 +38,19 @@ TEST(OutputFile, UncommittedLeavesNothingAndKeepsTheOldFile) {
     EXPECT_EQ(folder.entries(), 1);
 }
 
+TEST(OutputFile, WritesTextWholeOrNotAtAll) {
+    const TemporaryFolder folder;
+    writeFile(folder / "a.json", "old and longer");
+    {
+        const OutputFile file(folder / "a.json");
+        file.write("new, never finished");
+    }
+    EXPECT_EQ(std::filesystem::file_size(folder / "a.json"), 14u);
+    writeFile(folder / "a.json", std::string_view("n\0w", 3));
+    EXPECT_EQ(std::filesystem::file_size(folder / "a.json"), 3u);
+    EXPECT_EQ(folder.entries(), 1);
+}
+
 TEST(OutputFile, DoesNotReplaceADevice) { EXPECT_THROW(OutputFile("/dev/null"), Error); }
 
 // In a process of its own: afterwards no file can be written.

@@ -259,11 +259,8 @@ TEST_F(CompareTool, BadUsageIsTwoAndEachOptionMissesItsValue) {
 
 TEST_F(CompareTool, BadFilesAreOneWithAMessageAndNoOutput) {
     std::ofstream(folder_ / "text.exr") << "no image";
-    {
-        std::ifstream whole(good_, std::ios::binary);
-        std::string bytes((std::istreambuf_iterator<char>(whole)), {});
-        std::ofstream(folder_ / "short.exr", std::ios::binary) << bytes.substr(0, bytes.size() / 2);
-    }
+    const std::string whole = contentsOf(good_);
+    std::ofstream(folder_ / "short.exr", std::ios::binary) << whole.substr(0, whole.size() / 2);
     Image moved = reference_;
     moved.data.x += 1;
     writeImage(folder_ / "moved.exr", moved);

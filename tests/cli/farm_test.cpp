@@ -270,11 +270,6 @@ Measured finish(pid_t child) {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, static_cast<std::uint64_t>(usage.ru_maxrss) * 1024};
 }
 
-std::string contents(const std::string& path) {
-    std::ifstream stream(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 #ifndef VARIOLUX_SANITIZED  // sanitizers take memory of their own
 TEST(MaxMemory, IsKeptAndTheImageIsTheSame) {
     const TemporaryFolder folder;
@@ -282,12 +277,12 @@ TEST(MaxMemory, IsKeptAndTheImageIsTheSame) {
     writeWide(dump, 800, 16, 64);
     const Arguments command = {dump, "--quality", "draft", "--threads", "2", "-q"};
     const Measured free = finish(start(command + Arguments{"-o", folder / "free.exr"}, errors));
-    ASSERT_EQ(free.exitCode, 0) << contents(errors);
+    ASSERT_EQ(free.exitCode, 0) << contentsOf(errors);
     // The least that would do is what the refusal says.
     const Measured refused =
         finish(start(command + Arguments{"-o", folder / "none.exr", "--max-memory", "20M"}, errors));
     EXPECT_EQ(refused.exitCode, 1);
-    const std::string message = contents(errors);
+    const std::string message = contentsOf(errors);
     const std::size_t at = message.find("at least ");
     ASSERT_NE(at, std::string::npos) << message;
     EXPECT_FALSE(fs::exists(folder / "none.exr"));
@@ -295,7 +290,7 @@ TEST(MaxMemory, IsKeptAndTheImageIsTheSame) {
     const Measured tight = finish(
         start(command + Arguments{"-o", folder / "tight.exr", "--max-memory", std::to_string(least) + "M"},
               errors));
-    ASSERT_EQ(tight.exitCode, 0) << contents(errors);
+    ASSERT_EQ(tight.exitCode, 0) << contentsOf(errors);
     EXPECT_LE(tight.peakBytes, least * 1'000'000);
     EXPECT_LT(tight.peakBytes, free.peakBytes);
     EXPECT_EQ(readImage(folder / "tight.exr").pixels, readImage(folder / "free.exr").pixels);
@@ -307,14 +302,14 @@ TEST(Memory, OfASingleWideRowIsThatOfTheRow) {
     const std::string dump = folder / "wide.exr", errors = folder / "errors";
     writeWide(dump, 60'000, 1, 0);
     const Measured run = finish(start({dump, "-o", folder / "out.exr", "-q"}, errors));
-    ASSERT_EQ(run.exitCode, 0) << contents(errors);
+    ASSERT_EQ(run.exitCode, 0) << contentsOf(errors);
     EXPECT_LT(run.peakBytes, 400'000'000u);
 
     // A limit is kept also where it is too small: what cannot be is told before memory is taken.
     writeWide(dump, 20'000, 200, 0);
     const Measured refused = finish(start({dump, "-o", folder / "none.exr", "--max-memory", "400M"}, errors));
     EXPECT_EQ(refused.exitCode, 1);
-    EXPECT_NE(contents(errors).find("expected a memory limit of at least"), std::string::npos);
+    EXPECT_NE(contentsOf(errors).find("expected a memory limit of at least"), std::string::npos);
     EXPECT_LT(refused.peakBytes, 400'000'000u);
 }
 
@@ -330,7 +325,7 @@ TEST(Load, ThirtyTwoProcessesAtOnceFinishWithinTheirLimits) {
     std::uint64_t sum = 0;
     for (const pid_t child : children) {
         const Measured one = finish(child);
-        EXPECT_EQ(one.exitCode, 0) << contents(errors);
+        EXPECT_EQ(one.exitCode, 0) << contentsOf(errors);
         EXPECT_LE(one.peakBytes, kLimit * 1'000'000);
         sum += one.peakBytes;
     }
@@ -408,10 +403,10 @@ TEST(Replaced, DumpsAreAnErrorAndNoImage) {
         else
             writeWide(dump, 200, 120, 1);
         EXPECT_EQ(finish(child).exitCode, 1);
-        EXPECT_NE(contents(errors).find(dump), std::string::npos) << contents(errors);
+        EXPECT_NE(contentsOf(errors).find(dump), std::string::npos) << contentsOf(errors);
         if (!cut) {
-            EXPECT_NE(contents(errors).find("changed while it was read"), std::string::npos)
-                << contents(errors);
+            EXPECT_NE(contentsOf(errors).find("changed while it was read"), std::string::npos)
+                << contentsOf(errors);
         }
         EXPECT_FALSE(fs::exists(out));
     }

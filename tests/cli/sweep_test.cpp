@@ -27,14 +27,9 @@ ToolRun sweep(std::vector<std::string> arguments) {
     return runTool("vlx-compare", arguments);
 }
 
-std::string contents(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
 std::vector<nlohmann::json> records(const std::string& folder) {
     std::vector<nlohmann::json> result;
-    std::istringstream lines(contents(folder + "/results.jsonl"));
+    std::istringstream lines(contentsOf(folder + "/results.jsonl"));
     for (std::string line; std::getline(lines, line);) result.push_back(nlohmann::json::parse(line));
     return result;
 }
@@ -89,26 +84,26 @@ TEST(VlxCompareSweep, OfADumpThenAgainThenInterrupted) {
         }
     }
     EXPECT_EQ(keys.size(), all.size());
-    const std::string csv = contents(out + "/results.csv");
+    const std::string csv = contentsOf(out + "/results.csv");
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), static_cast<long>(all.size()) + 1);
-    const std::string report = contents(out + "/report.html");
+    const std::string report = contentsOf(out + "/report.html");
     EXPECT_GT(report.size(), 50000u);
     EXPECT_NE(report.find("\"inspection\":"), std::string::npos);
     EXPECT_FALSE(std::filesystem::exists(out + "/scratch"));
 
     // Again: nothing is run.
-    const std::string before = contents(out + "/results.jsonl");
+    const std::string before = contentsOf(out + "/results.jsonl");
     const ToolRun again = sweep(arguments);
     ASSERT_EQ(again.exitCode, 0) << again.err;
     EXPECT_NE(again.out.find("19 of 19 results were there already"), std::string::npos) << again.out;
-    EXPECT_EQ(contents(out + "/results.jsonl"), before);
+    EXPECT_EQ(contentsOf(out + "/results.jsonl"), before);
 
     // The last line was being written when the machine died: that run alone is repeated, and its dump.
     std::filesystem::resize_file(out + "/results.jsonl", before.size() - 30);
     const ToolRun resumed = sweep(arguments);
     ASSERT_EQ(resumed.exitCode, 0) << resumed.err;
     EXPECT_NE(resumed.out.find("17 of 19 results were there already"), std::string::npos) << resumed.out;
-    EXPECT_TRUE(contents(out + "/results.jsonl")
+    EXPECT_TRUE(contentsOf(out + "/results.jsonl")
                     .starts_with(before.substr(0, before.rfind('\n', before.size() - 31))));
 
     // A kept image that is gone is made again.
@@ -222,7 +217,7 @@ TEST(VlxCompareSweep, FailingMethodIsShownFailing) {
     const ToolRun run = sweep(arguments);
     EXPECT_EQ(run.exitCode, 1);
     EXPECT_NE(run.out.find("failed: exit code 4: no licence"), std::string::npos) << run.out;
-    EXPECT_NE(contents(out + "/report.html").find("no licence"), std::string::npos);
+    EXPECT_NE(contentsOf(out + "/report.html").find("no licence"), std::string::npos);
     // Failures are tried again, the rest is not.
     const ToolRun again = sweep(arguments);
     EXPECT_EQ(again.exitCode, 1);
@@ -279,7 +274,7 @@ TEST(VlxCompareSweep, DamagedResultsAreNotOverwritten) {
     EXPECT_EQ(run.exitCode, 1);
     EXPECT_NE(run.err.find("results.jsonl: expected a line that a sweep wrote"), std::string::npos)
         << run.err;
-    EXPECT_EQ(contents(folder / "out/results.jsonl"), "something else\n");
+    EXPECT_EQ(contentsOf(folder / "out/results.jsonl"), "something else\n");
 }
 
 TEST(VlxCompareSweep, FolderHoldsOneSweepAtATime) {

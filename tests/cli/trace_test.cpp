@@ -18,11 +18,6 @@ const std::string kScene = VLX_TESTDATA "/scenes/interior.glb";
 
 ToolRun trace(const std::vector<std::string>& arguments) { return runTool("vlx-trace", arguments); }
 
-std::string bytes(const std::string& path) {
-    std::ifstream stream(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 TEST(VlxTrace, SameBytesOfSamplesForAnyNumberOfThreads) {
     const TemporaryFolder folder;
     for (const bool hierarchical : {false, true}) {
@@ -95,7 +90,7 @@ TEST(VlxTrace, FailuresAreExitOneNameTheFileAndLeaveNoOutput) {
     const TemporaryFolder folder;
     const TemporaryFolder target;
     std::ofstream(folder / "text.glb") << "not a scene";
-    std::ofstream(folder / "truncated.glb", std::ios::binary) << bytes(kScene).substr(0, 100000);
+    std::ofstream(folder / "truncated.glb", std::ios::binary) << contentsOf(kScene).substr(0, 100000);
     std::ofstream(folder / "nocamera.gltf")
         << R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]})";
     std::ofstream(folder / "nobuffer.gltf")

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -256,12 +255,7 @@ struct SweepCommand {
     }
 
     void writePage(const Sweep& sweep, const SweepSummary& summary, const SweepPageOptions& page) const {
-        OutputFile file(options.folder + "/report.html");
-        std::ofstream stream(file.temporaryPath(), std::ios::binary);
-        stream << toHtml(sweep, summary, page);
-        stream.close();
-        if (!stream) throw Error(file.path(), "writing failed");
-        file.commit();
+        writeFile(options.folder + "/report.html", toHtml(sweep, summary, page));
     }
 };
 

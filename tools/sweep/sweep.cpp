@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -16,8 +14,10 @@
 #include "sweep/sweep_plan.h"
 #include "sweep/sweep_store.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
+#include "variolux/base/text.h"
 #include "variolux/compare/metrics.h"
 
 namespace vlx {
@@ -29,11 +29,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kStddev = "stddev";
-
-std::string samplingText(const SweepSampling& sampling) {
-    return sampling.hierarchical ? "tolerance " + numberText(sampling.setting)
-                                 : numberText(sampling.setting) + " spp";
-}
 
 /// One sweep while it runs.
 class Runner {
@@ -87,12 +82,11 @@ class Runner {
     void announce(const std::string& what, const SweepSampling& sampling, int seed, const SweepRecord& record,
                   bool reused) {
         ++step_;
-        char time[32];
-        std::snprintf(time, sizeof time, "%.2f s", record.seconds);
         std::string text = "[" + std::to_string(step_) + "/" + std::to_string(total_) + "] " + what + ", " +
                            samplingText(sampling) + ", seed " + std::to_string(seed) + ": ";
-        text += !record.failure.empty() ? "failed: " + record.failure
-                                        : (std::isfinite(record.seconds) ? std::string(time) : "done");
+        text += !record.failure.empty()
+                    ? "failed: " + record.failure
+                    : (std::isfinite(record.seconds) ? formatted("%.2f s", record.seconds) : "done");
         say(text + (reused ? " (done before)" : ""));
     }
 
@@ -147,6 +141,13 @@ class Runner {
                    : nullptr;
     }
 
+    /// What a run took.
+    static void take(const ProcessRun& run, SweepRecord& record) {
+        record.seconds = run.seconds;
+        record.cpuSeconds = run.cpuSeconds();
+        record.peakBytes = run.peakBytes;
+    }
+
     SweepRecord sample(const std::string& command, const std::string& key, const std::string& dump,
                        const SweepSampling& sampling, int seed) {
         SweepRecord record;
@@ -175,9 +176,7 @@ class Runner {
             const double rays = report.at("traceCpuSeconds");
             const double pixels = report.at("width").get<double>() * report.at("height").get<double>();
             record.samplesPerPixel = report.at("samples").get<double>() / pixels;
-            record.seconds = run.seconds;
-            record.cpuSeconds = run.cpuSeconds();
-            record.peakBytes = run.peakBytes;
+            take(run, record);
             // Writing goes on beside tracing: of the wall time it gets its share of the processor's.
             const double written = trace * write / std::max(write + rays, 1e-9);
             record.stages = {{"trace", trace - written},
@@ -210,9 +209,7 @@ class Runner {
         const ProcessRun run = runCommand(plan_.executable(
             filled(record.command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(image)}})));
         record.command = filled(record.command, {{"input", "samples.exr"}, {"output", "image.exr"}});
-        record.seconds = run.seconds;
-        record.cpuSeconds = run.cpuSeconds();
-        record.peakBytes = run.peakBytes;
+        take(run, record);
         if (run.exitCode != 0)
             record.failure = failureOf(run);
         else
@@ -260,7 +257,10 @@ class Runner {
     }
 
     std::string inspectionKey(const SweepRecord& record) const {
-        return hexText(textHash(record.key + " inspect " + std::to_string(plan_.options.inspectedRegions)));
+        return Fingerprint()
+            .add("image", record.key)
+            .add("inspect", std::to_string(plan_.options.inspectedRegions))
+            .text();
     }
 
     const SweepRecord* doneInspection(const SweepRecord& record) const {
@@ -295,9 +295,7 @@ class Runner {
             const ProcessRun run = runCommand(plan_.executable(
                 filled(command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(output)}})));
             record.command = filled(command, {{"input", "samples.exr"}, {"output", "image.exr"}});
-            record.seconds = run.seconds;
-            record.cpuSeconds = run.cpuSeconds();
-            record.peakBytes = run.peakBytes;
+            take(run, record);
             if (run.exitCode != 0)
                 record.failure = failureOf(run);
             else
@@ -309,14 +307,7 @@ class Runner {
         sweep_.records.push_back(record);
     }
 
-    void writeCsv() const {
-        OutputFile file(plan_.options.folder + "/results.csv");
-        std::ofstream stream(file.temporaryPath(), std::ios::binary);
-        stream << toCsv(sweep_.records);
-        stream.close();
-        if (!stream) throw Error(file.path(), "writing failed");
-        file.commit();
-    }
+    void writeCsv() const { writeFile(plan_.options.folder + "/results.csv", toCsv(sweep_.records)); }
 
     SweepPlan plan_;
     std::function<void(const std::string&)> log_;

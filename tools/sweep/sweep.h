@@ -79,6 +79,9 @@ struct SweepSampling {
     bool operator==(const SweepSampling&) const = default;
 };
 
+/// "16 spp", "tolerance 0.1".
+std::string samplingText(const SweepSampling& sampling);
+
 enum class SweepKind {
     Sampling,    ///< a dump was traced, or taken from the input
     Image,       ///< an image was made of it
@@ -145,7 +148,7 @@ struct Sweep {
 /// gone.
 ///
 /// A record is taken as done when input, reference, command and programs are what they were, by content
-/// (files above 64 MiB by size, time and first MiB; what a .gltf refers to is not looked at).
+/// (what a .gltf refers to is not looked at).
 ///
 /// A method that fails is recorded so and the rest goes on. Throws Error when input or reference cannot be
 /// read, their sizes differ, a program is missing (before anything is run), sampling fails, or another sweep

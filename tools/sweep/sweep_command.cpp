@@ -1,13 +1,13 @@
 #include "sweep/sweep_command.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <sstream>
 #include <utility>
 
-#include "sweep/sweep_store.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -40,15 +40,11 @@ std::string namedFiles(const std::string& command) {
     std::istringstream words(command);
     std::error_code ignored;
     for (std::string word; words >> word;)
-        if (fs::is_regular_file(word, ignored)) identities += fileIdentity(word);
+        if (fs::is_regular_file(word, ignored)) identities += fileFingerprint(word);
     return identities;
 }
 
-std::string numberText(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", value);
-    return text;
-}
+std::string numberText(double value) { return formatted("%.6g", value); }
 
 Json reportOf(const ProcessRun& run, const std::string& command) {
     Json report = Json::parse(run.out, nullptr, false);
@@ -80,9 +76,7 @@ std::string failureOf(const ProcessRun& run) {
     text.erase(text.find_last_not_of(" \n") + 1);
     const std::size_t end = text.rfind('\n');
     if (end != std::string::npos) text = text.substr(end + 1);
-    for (char& c : text)  // a terminal would obey them
-        if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
-    return "exit code " + std::to_string(run.exitCode) + (text.empty() ? "" : ": " + text);
+    return "exit code " + std::to_string(run.exitCode) + (text.empty() ? "" : ": " + printable(text));
 }
 
 }  // namespace vlx

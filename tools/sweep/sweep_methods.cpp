@@ -3,6 +3,7 @@
 
 #include "sweep/sweep.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -36,9 +37,9 @@ std::vector<SweepMethod> expandVariation(const std::vector<SweepMethod>& methods
     const auto method =
         std::find_if(methods.begin(), methods.end(), [&](const SweepMethod& m) { return m.name == name; });
     if (method == methods.end()) {
-        std::string all;
-        for (const SweepMethod& m : methods) all += (all.empty() ? "" : ", ") + m.name;
-        throw Error(text, "expected a method of the sweep (" + all + "), found '" + name + "'");
+        std::vector<std::string> all;
+        for (const SweepMethod& m : methods) all.push_back(m.name);
+        throw Error(text, "expected a method of the sweep (" + listed(all) + "), found '" + name + "'");
     }
     const auto varied = [&](const std::string& options) {
         SweepMethod variation = *method;
@@ -50,8 +51,7 @@ std::vector<SweepMethod> expandVariation(const std::vector<SweepMethod>& methods
     };
     if (values.empty()) return {varied(option)};
     std::vector<SweepMethod> result;
-    std::istringstream list(values);
-    for (std::string value; std::getline(list, value, ',');) {
+    for (const std::string& value : split(values, ',')) {
         if (value.empty()) throw Error(text, "expected values separated by single commas");
         result.push_back(varied(option + " " + value));
     }

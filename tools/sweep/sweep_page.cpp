@@ -1,9 +1,9 @@
 #include "sweep/sweep_page.h"
 
+#include <Imath/half.h>
 #include <zlib.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -20,16 +20,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// IEEE half of a float, rounded to nearest even; too large becomes the largest finite one, because error
-/// views subtract; NaN stays NaN.
+/// Too large becomes the largest finite half, because error views subtract; NaN stays NaN.
 std::uint16_t halfOf(float value) {
-    if (std::isnan(value)) return 0x7e00;
-    const auto sign = static_cast<std::uint16_t>(std::signbit(value) ? 0x8000 : 0);
-    const float magnitude = std::min(std::abs(value), 65504.0f);
-    if (magnitude < 6.103515625e-5f)  // below 2^-14: multiples of 2^-24
-        return static_cast<std::uint16_t>(sign | std::lrint(magnitude * 16777216.0f));
-    const auto bits = std::bit_cast<std::uint32_t>(magnitude) - ((127u - 15u) << 23);
-    return static_cast<std::uint16_t>(sign | ((bits + 0xfff + ((bits >> 13) & 1)) >> 13));
+    constexpr auto kMost = static_cast<float>(HALF_MAX);
+    return imath_float_to_half(std::clamp(value, -kMost, kMost));
 }
 
 std::string base64(const std::vector<unsigned char>& bytes) {

@@ -7,8 +7,8 @@
 
 #include "sweep/child_process.h"
 #include "sweep/sweep_command.h"
-#include "sweep/sweep_store.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/image_io.h"
 #include "variolux/compare/metrics.h"
@@ -32,7 +32,7 @@ void readReference(SweepPlan& plan) {
     const Image image = readImage(plan.options.reference);
     plan.reference = ReferenceImage{colourOf(image, plan.options.reference), {}};
     if (hasLayer(image, kStddev)) plan.reference->stddev = colourOf(image, plan.options.reference, kStddev);
-    plan.referenceIdentity = fileIdentity(plan.options.reference);
+    plan.referenceIdentity = fileFingerprint(plan.options.reference);
 }
 
 /// Finds the program, and what tells this version of it from others.
@@ -48,7 +48,7 @@ void identify(SweepPlan& plan, const std::string& program) {
     }
     std::error_code ignored;
     // A shell builtin is no file: its name has to do.
-    const std::string identity = fs::is_regular_file(path, ignored) ? fileIdentity(path) : path;
+    const std::string identity = fs::is_regular_file(path, ignored) ? fileFingerprint(path) : path;
     plan.programs[program] = {path, identity};
 }
 
@@ -156,24 +156,29 @@ std::string SweepPlan::executable(const std::string& command) const {
 }
 
 std::string SweepPlan::samplingKey(const std::string& command) const {
-    return hexText(textHash(command, textHash(inputIdentity + programs.at(firstWord(command)).second)));
+    return Fingerprint()
+        .add("command", command)
+        .add("input", inputIdentity)
+        .add("program", programs.at(firstWord(command)).second)
+        .text();
 }
 
 std::string SweepPlan::imageKey(const std::string& sampling, const SweepMethod& method,
                                 const std::string& command) const {
-    return hexText(
-        textHash(command, textHash(sampling + referenceIdentity + programs.at(firstWord(command)).second +
-                                   methodFiles.at(method.name))));
+    return Fingerprint()
+        .add("command", command)
+        .add("sampling", sampling)
+        .add("reference", referenceIdentity)
+        .add("program", programs.at(firstWord(command)).second)
+        .add("files", methodFiles.at(method.name))
+        .text();
 }
 
 void SweepPlan::requireReferenceWindow(const Window& window) const {
-    const auto text = [](const Window& w) {
-        return std::to_string(w.width) + " x " + std::to_string(w.height) + " pixels at (" +
-               std::to_string(w.x) + ", " + std::to_string(w.y) + ")";
-    };
     const Window& found = reference->colour.data;
     if (!(found == window))
-        throw Error(options.reference, "expected the dump's " + text(window) + ", found " + text(found));
+        throw Error(options.reference,
+                    "expected the dump's " + windowText(window) + ", found " + windowText(found));
 }
 
 SweepPlan planSweep(SweepOptions options, const std::function<void(const std::string&)>& log) {
@@ -186,7 +191,7 @@ SweepPlan planSweep(SweepOptions options, const std::function<void(const std::st
     plan.fromDump = !scene;
     if (plan.options.methods.empty()) throw Error("", "expected at least one method");
     if (plan.options.seeds < 1) throw Error("", "expected at least one seed");
-    plan.inputIdentity = fileIdentity(plan.options.input);
+    plan.inputIdentity = fileFingerprint(plan.options.input);
     if (!plan.options.reference.empty()) readReference(plan);
     for (const char* program : {"vlx-trace", "vlx-pack", "vlx-krige"}) identify(plan, program);
     for (auto* methods : {&plan.options.methods, &plan.options.variations}) {

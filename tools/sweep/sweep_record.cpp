@@ -6,6 +6,7 @@
 #include "sweep/sweep.h"
 #include "sweep/sweep_json.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -82,6 +83,10 @@ Json toJson(const Reliability& r) {
     json["coverage"] = Json::array();
     for (const double share : r.coverage) json["coverage"].push_back(numberJson(share));
     return json;
+}
+
+std::string samplingText(const SweepSampling& sampling) {
+    return formatted(sampling.hierarchical ? "tolerance %g" : "%g spp", sampling.setting);
 }
 
 std::string toJsonLine(const SweepRecord& r) {

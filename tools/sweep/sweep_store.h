@@ -1,22 +1,11 @@
 #pragma once
 
-#include <cstdint>
 #include <map>
 #include <string>
-#include <string_view>
 
 #include "sweep/sweep.h"
 
 namespace vlx {
-
-std::uint64_t textHash(std::string_view text, std::uint64_t hash = 0);
-
-/// 16 hexadecimal digits.
-std::string hexText(std::uint64_t value);
-
-/// What tells a file from another: a hash of its content; of files above 64 MiB of their size, time of change
-/// and first MiB. Throws Error when it is no file that can be read.
-std::string fileIdentity(const std::string& path);
 
 /// A sweep's results.jsonl: held against other sweeps, read once, then added to.
 class ResultsFile {

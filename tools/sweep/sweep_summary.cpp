@@ -234,12 +234,6 @@ void compareWithBaseline(SweepSummary& summary, const SweepSeries& baseline) {
     }
 }
 
-std::string samplingText(const SweepSampling& sampling) {
-    char text[48];
-    std::snprintf(text, sizeof text, sampling.hierarchical ? "tolerance %g" : "%g spp", sampling.setting);
-    return text;
-}
-
 std::vector<EqualTime> equalTimesOf(const SweepSummary& summary, const SweepSeries& baseline) {
     std::vector<EqualTime> times;
     for (const std::size_t b : baseline.settings) {

@@ -46,10 +46,6 @@ class ImageWriter {
 /// Writes a whole image as ImageWriter does.
 void writeImage(const std::string& path, const Image& image, const ImageWriteOptions& options = {});
 
-/// Text attribute of an image or a dump that says what it was made of: a hash of inputs and parameters,
-/// followed by " band I/N" where only a band of rows was made.
-inline constexpr char kInputsAttribute[] = "variolux:inputs";
-
 /// A text attribute of the first part of an image or a dump; empty when there is none, or no such file.
 std::string readTextAttribute(const std::string& path, const std::string& name);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 namespace vlx {
 
@@ -19,6 +20,9 @@ class OutputFile {
     const std::string& path() const { return path_; }
     const std::string& temporaryPath() const { return temporary_; }
 
+    /// Makes `bytes` all that the temporary file holds. Throws Error when the disk refuses.
+    void write(std::string_view bytes) const;
+
     /// Flushes the temporary file to disk and renames it to its final name. Throws Error when that fails.
     void commit();
 
@@ -28,6 +32,10 @@ class OutputFile {
     int slot_ = -1;
     bool committed_ = false;
 };
+
+/// Writes a whole file, which appears under its name only when it is complete. Throws Error as OutputFile
+/// does.
+void writeFile(const std::string& path, std::string_view bytes);
 
 /// Deletes the temporary files of all OutputFiles that are under construction (up to 64 at once). For a
 /// program's signal handler, before the process ends: async-signal-safe. Afterwards no commit() succeeds.

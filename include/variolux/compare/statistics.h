@@ -17,7 +17,7 @@ struct Interval {
 };
 
 /// The quantile of Student's t that a two-sided 95 % interval needs: P(|T| <= t) = 0.95 with `degrees` >= 1
-/// degrees of freedom, from the finite sums of Abramowitz and Stegun 26.7.3 and 26.7.4, to 1e-9.
+/// degrees of freedom.
 double studentQuantile95(int degrees);
 
 /// The mean and its interval, value +- t s / sqrt(n). Values that are not finite make the value NaN.

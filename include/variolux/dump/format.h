@@ -57,7 +57,7 @@ inline constexpr std::string_view kVarianceChannels[] = {"variance.R", "variance
 /// Nothing for any other value; readers refuse files that have one.
 std::optional<std::uint32_t> replicateNumber(float value);
 
-/// Lets `header` say what the dump is made of (kInputsAttribute of base/image_io.h): nothing when empty.
+/// Lets `header` say what the dump is made of (kInputsAttribute of base/fingerprint.h): nothing when empty.
 void setInputs(DumpHeader& header, const std::string& inputs);
 
 /// The three colours, or coordinates, of a layer among `names`: layer.R .G .B, or .r .g .b, .X .Y .Z,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "reconstruct/common/planes.h"
+#include "variolux/base/luminance.h"
 #include "variolux/dump/band.h"
 #include "variolux/dump/format.h"
 #include "variolux/dump/sample_source.h"
@@ -29,7 +30,7 @@ struct SampleLayout {
 
 /// Of linear R, G, B with the primaries of Rec. 709; not negative.
 inline float luminance(const double* rgb) {
-    const double y = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+    const double y = luminance(rgb[0], rgb[1], rgb[2]);
     return static_cast<float>(y > 0 ? y : 0);
 }
 

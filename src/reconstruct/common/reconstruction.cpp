@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <sstream>
+
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -54,9 +55,7 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
 /// Five digits: a drawing needs no more, and files stay small.
 nlohmann::ordered_json rounded(double value) {
     if (!std::isfinite(value)) return nullptr;
-    char text[32];
-    std::snprintf(text, sizeof text, "%.5g", value);
-    return std::strtod(text, nullptr);
+    return std::strtod(formatted("%.5g", value).c_str(), nullptr);
 }
 
 std::string_view name(StructureType type) {

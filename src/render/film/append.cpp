@@ -14,11 +14,6 @@ bool sameMatrix(const std::optional<std::vector<float>>& a, const std::optional<
                               [](float x, float y) { return std::abs(x - y) <= 1e-4f * (1 + std::abs(x)); });
 }
 
-std::string inWords(const Window& w) {
-    return std::to_string(w.width) + "x" + std::to_string(w.height) + " from (" + std::to_string(w.x) + ", " +
-           std::to_string(w.y) + ")";
-}
-
 }  // namespace
 
 EarlierDump::EarlierDump(const std::string& path) : reader_(path) {
@@ -51,9 +46,9 @@ std::uint32_t EarlierDump::freeReplicate() const {
 void EarlierDump::checkSameView(const DumpHeader& traced) const {
     const DumpHeader& own = header();
     if (own.data != traced.data || own.display != traced.display)
-        throw Error(reader_.path(), "expected a picture of " + inWords(traced.data) + " in " +
-                                        inWords(traced.display) + ", found " + inWords(own.data) + " in " +
-                                        inWords(own.display));
+        throw Error(reader_.path(), "expected a picture of " + windowText(traced.data) + " in " +
+                                        windowText(traced.display) + ", found " + windowText(own.data) +
+                                        " in " + windowText(own.display));
     if (!sameMatrix(own.worldToCamera, traced.worldToCamera) ||
         !sameMatrix(own.worldToNDC, traced.worldToNDC))
         throw Error(reader_.path(), "expected the view of the camera that is traced, found another one");

@@ -9,6 +9,7 @@
 #include "render/film/band_tracer.h"
 #include "render/integrator/bidirectional.h"
 #include "variolux/base/error.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/memory.h"
 #include "variolux/dump/writer.h"

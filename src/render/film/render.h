@@ -36,7 +36,7 @@ struct RenderOptions {
     std::string integratorReason;  ///< for the header, when not empty
     DumpCompression compression = DumpCompression::Rle;
     std::string version;       ///< of the program, for the header
-    std::string inputs;        ///< for the header's kInputsAttribute (base/image_io.h)
+    std::string inputs;        ///< for the header's kInputsAttribute (base/fingerprint.h)
     std::optional<Plan> plan;  ///< set by follow()
 
     /// Adopts a plan, which applyPlan is to apply to the scene too.

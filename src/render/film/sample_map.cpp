@@ -6,31 +6,21 @@
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/image_io.h"
+#include "variolux/base/text.h"
 
 namespace vlx::render {
-namespace {
-
-std::string inWords(const Window& w) {
-    return std::to_string(w.width) + "x" + std::to_string(w.height) + " pixels from (" + std::to_string(w.x) +
-           ", " + std::to_string(w.y) + ")";
-}
-
-}  // namespace
 
 SampleMap::SampleMap(const std::string& path, const Window& window)
     : image_(readImage(path)), channel_(image_.channel("sampling.density")), pixels_(window.pixels()) {
     if (channel_ < 0) channel_ = image_.channel("Y");
     if (channel_ < 0 && image_.channelCount() == 1) channel_ = 0;
-    if (channel_ < 0) {
-        std::string names;
-        for (const std::string& name : image_.channels) names += (names.empty() ? "" : ", ") + name;
-        throw Error(path, "expected a channel sampling.density or Y, found " + names);
-    }
+    if (channel_ < 0)
+        throw Error(path, "expected a channel sampling.density or Y, found " + listed(image_.channels));
     const Window& held = image_.data;
     const bool covers = window.x >= held.x && window.y >= held.y &&
                         window.x + window.width <= held.x + held.width &&
                         window.y + window.height <= held.y + held.height;
-    if (!covers) throw Error(path, "expected " + inWords(window) + ", found " + inWords(held));
+    if (!covers) throw Error(path, "expected " + windowText(window) + ", found " + windowText(held));
     for (int y = window.y; y < window.y + window.height; ++y) {
         for (int x = window.x; x < window.x + window.width; ++x) {
             const float v = image_.at(x - held.x, y - held.y)[channel_];

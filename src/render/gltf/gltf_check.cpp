@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx::render {
 namespace {
@@ -216,14 +217,14 @@ class Checker {
             if (!isSupported(name.get<std::string>())) missing.push_back(name.get<std::string>());
         }
         if (missing.empty()) return;
-        std::string names, remedies;
+        std::string remedies;
         for (const std::string& name : missing) {
-            names += (names.empty() ? "" : ", ") + name;
             const std::string remedy = remedyFor(name);
             if (remedies.find(remedy) == std::string::npos) remedies += remedy;
         }
         throw Error(file_,
-                    std::string("requires the extension") + (missing.size() > 1 ? "s " : " ") + names +
+                    std::string("requires the extension") + (missing.size() > 1 ? "s " : " ") +
+                        listed(missing) +
                         (missing.size() > 1 ? ", which are not supported" : ", which is not supported") +
                         (remedies.empty() ? "; export it without" : remedies));
     }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "variolux/base/luminance.h"
+
 namespace vlx::render {
 
 inline constexpr float kPi = std::numbers::pi_v<float>;
@@ -49,7 +51,7 @@ constexpr float maxComponent(const Vec3& a) { return std::max(a.x, std::max(a.y,
 constexpr bool isBlack(const Rgb& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
 inline bool isFinite(const Vec3& a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 /// Relative luminance of Rec. 709 primaries.
-constexpr float luminance(const Rgb& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+constexpr float luminance(const Rgb& c) { return vlx::luminance(c.x, c.y, c.z); }
 constexpr float square(float v) { return v * v; }
 
 /// Two numbers in [0, 1), or two texture coordinates.

@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "render/integrator/bidirectional.h"
 #include "variolux/base/hash.h"
+#include "variolux/base/text.h"
 
 namespace vlx::render {
 namespace {
@@ -165,12 +165,6 @@ struct Errors {
     double both = 0;
 };
 
-std::string text(const char* format, double value) {
-    char buffer[64];
-    std::snprintf(buffer, sizeof buffer, format, value);
-    return buffer;
-}
-
 }  // namespace
 
 IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& accelerator,
@@ -195,9 +189,9 @@ IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& acceler
         const double share = all > 0 ? straight / all : 1;
         if (share >= 0.25)
             return {Integrator::Path,
-                    "no caustics, and " + text("%.0f", 100 * share) + " % of the light comes straight",
+                    "no caustics, and " + formatted("%.0f", 100 * share) + " % of the light comes straight",
                     false};
-        why = "only " + text("%.0f", 100 * share) + " % of the light comes straight";
+        why = "only " + formatted("%.0f", 100 * share) + " % of the light comes straight";
     }
     const Pilot path = pilots.path(options.path.maxBounces, kRounds);
     const Pilot both = pilots.bidirectional();
@@ -206,10 +200,10 @@ IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& acceler
     const double bothCost = errors.both * both.rays * kRayCost;
     const bool better = bothCost * kMargin < pathCost;
     const double ratio = bothCost > 0 ? pathCost / bothCost : 1;
-    return {
-        better ? Integrator::Bidirectional : Integrator::Path,
-        why + "; in a pilot bidirectional tracing was " + text("%.2g", ratio) + " times as fast to an error",
-        true};
+    return {better ? Integrator::Bidirectional : Integrator::Path,
+            why + "; in a pilot bidirectional tracing was " + formatted("%.2g", ratio) +
+                " times as fast to an error",
+            true};
 }
 
 }  // namespace vlx::render

@@ -4,6 +4,7 @@
 
 #include "render/plan/material_range.h"
 #include "render/plan/reach.h"
+#include "variolux/base/text.h"
 
 namespace vlx::render {
 namespace {
@@ -284,10 +285,8 @@ class Analysis {
 std::optional<EffectRequest> parseEffects(std::string_view text, std::string& broken) {
     EffectRequest request;
     bool first = true;
-    for (std::size_t begin = 0; begin <= text.size();) {
-        const std::size_t end = std::min(text.find(',', begin), text.size());
-        const std::string_view word = text.substr(begin, end - begin);
-        begin = end + 1;
+    for (const std::string& words : split(text, ',')) {
+        const std::string_view word = words;
         if (first && (word == "auto" || word == "all")) {
             request.all = word == "all";
         } else if (!first && !request.all && word.starts_with('-') && effectNamed(word.substr(1))) {
