@@ -177,6 +177,8 @@ class Runner {
             record.seconds = run.seconds;
             record.cpuSeconds = run.cpuSeconds();
             record.peakBytes = run.peakBytes;
+            record.values = {{"trace_cpu_seconds", report.at("traceCpuSeconds")},
+                             {"write_cpu_seconds", write}};
             // Writing goes on beside tracing: of the wall time it gets its share of the processors.
             const double written = std::min(trace, write / report.at("threads").get<double>());
             record.stages = {{"trace", trace - written},
@@ -235,9 +237,14 @@ class Runner {
                 const Comparison comparison = compareColour(plan_.reference->colour, colour, path);
                 for (const MetricInfo& info : metricInfos())
                     record.values[std::string(info.name)] = comparison[info.metric];
-                if (stddev)
+                if (plan_.reference->stddev)
+                    record.values["floor"] =
+                        predictedError(plan_.reference->colour, *plan_.reference->stddev, path).relMse;
+                if (stddev) {
                     record.reliability = reliabilityOf(plan_.reference->colour, colour, *stddev,
                                                        plan_.reference->stddev, path);
+                    record.values["exact_pixels"] = exactPixels(colour, *stddev, *plan_.reference);
+                }
             }
             if (stddev) {
                 const PredictedError predicted = predictedError(colour, *stddev, path);
