@@ -68,8 +68,6 @@ vlx::ChannelMap replacedLayers(const vlx::KrigeOptions& o, const std::string& or
     return map;
 }
 
-}
-
 std::string inWords(const vlx::Window& w) {
     return "columns " + std::to_string(w.x) + " to " + std::to_string(w.x + (w.width - 1)) + " and rows " +
            std::to_string(w.y) + " to " + std::to_string(w.y + (w.height - 1));

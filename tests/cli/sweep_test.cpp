@@ -80,6 +80,8 @@ TEST(VlxCompareSweep, OfADumpThenAgainThenInterrupted) {
             EXPECT_GT(r["values"]["relmse"].get<double>(), 0) << r;
             EXPECT_EQ(r["values"].contains("sigma"), r["method"] == "gaussian");
             EXPECT_EQ(r.contains("reliability"), r["method"] != "gaussian");
+            EXPECT_EQ(r["values"].contains("exact_pixels"), r["method"] != "gaussian");
+            EXPECT_GT(r["values"]["floor"].get<double>(), 0);  // of the reference's own stddev
             EXPECT_GT(r["stages"]["other"].get<double>(), 0);
         }
     }
@@ -202,6 +204,23 @@ TEST(VlxCompareSweep, OfASceneWithTarget) {
               3);
 }
 
+TEST(VlxCompareSweep, WithoutMethodsOnlySamples) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    const ToolRun run = sweep({kScene, "-o", out, "--width", "16", "--height", "12", "--spp", "2,4",
+                               "--seeds", "1", "--methods", "none", "--json", "-q"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(run.out, contents(out + "/results.jsonl"));
+    const auto all = records(out);
+    ASSERT_EQ(all.size(), 2u);
+    for (const auto& r : all) {
+        EXPECT_EQ(r["kind"], "sampling");
+        EXPECT_GT(r["values"]["trace_cpu_seconds"].get<double>(), 0);
+        EXPECT_LE(r["values"]["trace_cpu_seconds"].get<double>(), r["cpuSeconds"].get<double>());
+    }
+    EXPECT_FALSE(std::filesystem::exists(out + "/report.html"));  // nothing to show
+}
+
 TEST(VlxCompareSweep, FailingMethodIsShownFailing) {
     const TemporaryFolder folder;
     const std::string out = folder / "out";
@@ -316,6 +335,7 @@ TEST(VlxCompareSweep, BadUsageIsExitTwo) {
           {kDump, "-o", out, "--width", "10"},
           {kDump, "-o", out, "--trace-options", "--max-bounces 1"},
           {kDump, "-o", out, "--methods", "mean,mean"},
+          {kDump, "-o", out, "--methods", "mean,none"},
           {kDump, "-o", out, "--nonsense"}}) {
         const ToolRun run = sweep(arguments);
         std::string line;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "sweep/sweep_images.h"
 #include "sweep/sweep_page.h"
 #include "sweep/sweep_summary.h"
 #include "variolux/base/error.h"
@@ -202,6 +203,19 @@ TEST(SweepRecord, CsvHasOneRowARecordAndQuotes) {
     std::size_t rows = 1;
     while (std::getline(lines, row)) ++rows;
     EXPECT_EQ(rows, sweep.records.size());
+}
+
+TEST(SweepImages, ExactPixelsHaveNoErrorAndKnowIt) {
+    const Image one({0, 0, 4, 1}, {"R", "G", "B"});
+    ReferenceImage reference{one, one};
+    Image colour = one, stddev = one;
+    EXPECT_EQ(exactPixels(colour, stddev, reference), 4);
+    colour.pixels[0] = 1;                 // wrong in red
+    stddev.pixels[5] = 1;                 // not known in blue
+    reference.stddev->pixels[6] = 1e-9f;  // the reference does not know
+    EXPECT_EQ(exactPixels(colour, stddev, reference), 1);
+    reference.stddev.reset();
+    EXPECT_EQ(exactPixels(colour, stddev, reference), 2);
 }
 
 TEST(SweepPage, HoldsTheDataWhateverNamesSay) {

@@ -131,7 +131,7 @@ class Evaluate(unittest.TestCase):
     def test_exact_pixels_are_left_out_of_coverage(self):
         row = self.row("noise_free", 64, "mean")
         self.assertGreater(row["exact_pixels"], 0)
-        self.assertLess(row["within"][0], row["calibration"]["within_1_stddev"])
+        self.assertLess(row["within"][0], row["reliability"]["withinOne"])
 
     def test_gaussian_has_no_coverage(self):
         self.assertEqual(self.row("noise_free", 4, "blur")["within"], [None, None])

@@ -28,6 +28,7 @@ struct SweepCommand {
     std::vector<std::string> targets;
     std::vector<std::string> crops;
     bool noVariations = false;
+    bool json = false;
 
     void bind(CLI::App& app) {
         SweepOptions& o = options;
@@ -91,7 +92,9 @@ struct SweepCommand {
         const char* const how = "Methods";
         std::string names;
         for (const SweepMethod& method : builtInMethods()) names += (names.empty() ? "" : ",") + method.name;
-        app.add_option("--methods", methods, "Built-in methods (default: " + names + ")")
+        app.add_option("--methods", methods,
+                       "Built-in methods (default: " + names +
+                           "); none: only those of --external, or only sampling if there are none")
             ->delimiter(',')
             ->option_text("NAME,...")
             ->group(how);
@@ -128,6 +131,9 @@ struct SweepCommand {
             ->group(how);
 
         const char* const answers = "Answers";
+        app.add_flag("--json", json,
+                     "Print the records of this sweep, a line each as in results.jsonl, instead of the table")
+            ->group(answers);
         app.add_option("--target", targets,
                        "Print the fastest commands of the sweep that reach this error, for example "
                        "relmse=0.01. Repeatable")
@@ -158,6 +164,7 @@ struct SweepCommand {
     void chooseMethods() {
         const std::vector<SweepMethod>& known = builtInMethods();
         if (methods.empty()) options.methods = known;
+        if (methods == std::vector<std::string>{"none"}) methods.clear();
         for (const std::string& name : methods) {
             const auto found = std::find_if(known.begin(), known.end(),
                                             [&](const SweepMethod& m) { return m.name == name; });
@@ -225,8 +232,10 @@ struct SweepCommand {
         });
         const SweepSummary summary = summarize(sweep);
         page.targets = wanted;
-        writePage(sweep, summary, page);
-        if (!isQuiet())
+        if (!summary.settings.empty()) writePage(sweep, summary, page);
+        if (json)
+            for (const SweepRecord& record : sweep.records) std::puts(toJsonLine(record).c_str());
+        else if (!isQuiet())
             std::printf("%s%d of %zu results were there already\nReport: %s/report.html\n",
                         toText(summary, sweep).c_str(), sweep.reused, sweep.records.size(),
                         options.folder.c_str());

@@ -177,6 +177,7 @@ class Runner {
             const double pixels = report.at("width").get<double>() * report.at("height").get<double>();
             record.samplesPerPixel = report.at("samples").get<double>() / pixels;
             take(run, record);
+            record.values = {{"trace_cpu_seconds", rays}, {"write_cpu_seconds", write}};
             // Writing goes on beside tracing: of the wall time it gets its share of the processor's.
             const double written = trace * write / std::max(write + rays, 1e-9);
             record.stages = {{"trace", trace - written},
@@ -233,9 +234,14 @@ class Runner {
                 const Comparison comparison = compareColour(plan_.reference->colour, colour, path);
                 for (const MetricInfo& info : metricInfos())
                     record.values[std::string(info.name)] = comparison[info.metric];
-                if (stddev)
+                if (plan_.reference->stddev)
+                    record.values["floor"] =
+                        predictedError(plan_.reference->colour, *plan_.reference->stddev, path).relMse;
+                if (stddev) {
                     record.reliability = reliabilityOf(plan_.reference->colour, colour, *stddev,
                                                        plan_.reference->stddev, path);
+                    record.values["exact_pixels"] = exactPixels(colour, *stddev, *plan_.reference);
+                }
             }
             if (stddev) {
                 const PredictedError predicted = predictedError(colour, *stddev, path);

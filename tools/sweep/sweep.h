@@ -51,11 +51,11 @@ std::vector<SweepMethod> expandVariation(const std::vector<SweepMethod>& methods
 SweepMethod parseExternal(const std::string& text);
 
 struct SweepOptions {
-    std::string input;      ///< a scene (.glb, .gltf) or a dump (.exr)
-    std::string reference;  ///< may be empty
-    std::string folder;     ///< made if need be
-    std::string programs;   ///< folder of vlx-trace, vlx-krige, vlx-pack
-    std::vector<SweepMethod> methods;
+    std::string input;                 ///< a scene (.glb, .gltf) or a dump (.exr)
+    std::string reference;             ///< may be empty
+    std::string folder;                ///< made if need be
+    std::string programs;              ///< folder of vlx-trace, vlx-krige, vlx-pack
+    std::vector<SweepMethod> methods;  ///< none: only samplings
     std::vector<SweepMethod> variations;
     std::vector<int> spp;  ///< the ladder; empty: 4, 16, 64, 256 of a scene; of a dump all it holds, and up
                            ///< to four times the half of that
@@ -106,8 +106,10 @@ struct SweepRecord {
     std::int64_t peakBytes = 0;
     double load = 0;                       ///< running processes a minute ago (load average): other work
     std::map<std::string, double> stages;  ///< wall seconds of its parts, as the command reports them
-    /// Metrics by metricInfos' names when there is a reference; predicted_rmse and predicted_relmse where the
-    /// image has a stddev layer; sigma where the command has one.
+    /// Of Image: metrics by metricInfos' names when there is a reference; predicted_rmse and predicted_relmse
+    /// where the image has a stddev layer, with a reference also exact_pixels, those without error that know
+    /// it; floor, the relMSE that a reference with a stddev layer adds by its own noise, on average; sigma
+    /// where the command has one. Of Sampling by vlx-trace: trace_cpu_seconds, write_cpu_seconds.
     std::map<std::string, double> values;
     std::optional<Reliability> reliability;  ///< with a reference and a stddev layer
     std::string file;  ///< kept image, or regions' JSON, relative to the folder; may be empty

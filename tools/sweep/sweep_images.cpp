@@ -59,6 +59,18 @@ std::vector<std::pair<int, int>> inspectedPixels(const Image& error, int count) 
     return places;
 }
 
+double exactPixels(const Image& colour, const Image& stddev, const ReferenceImage& reference) {
+    int exact = 0;
+    for (std::size_t i = 0; i < colour.pixels.size(); i += 3) {
+        bool all = true;
+        for (std::size_t c = i; c < i + 3; ++c)
+            all = all && colour.pixels[c] == reference.colour.pixels[c] && stddev.pixels[c] == 0 &&
+                  (!reference.stddev || reference.stddev->pixels[c] == 0);
+        exact += all;
+    }
+    return exact;
+}
+
 Image errorImage(const Image& colour, const std::optional<Image>& stddev,
                  const std::optional<ReferenceImage>& reference) {
     if (!reference) return stddev ? *stddev : Image(colour.data, colour.channels);

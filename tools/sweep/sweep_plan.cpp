@@ -189,7 +189,6 @@ SweepPlan planSweep(SweepOptions options, const std::function<void(const std::st
     if (!scene && extension != ".exr")
         throw Error(plan.options.input, "expected a scene (.glb, .gltf) or a sample dump (.exr)");
     plan.fromDump = !scene;
-    if (plan.options.methods.empty()) throw Error("", "expected at least one method");
     if (plan.options.seeds < 1) throw Error("", "expected at least one seed");
     plan.inputIdentity = fileFingerprint(plan.options.input);
     if (!plan.options.reference.empty()) readReference(plan);

@@ -1,0 +1,55 @@
+"""Runs programs, `vlx-compare sweep` above all, for the project's experiments: the sweep's records are the only ones, and
+charts are drawn by chart.py. Python 3 and its standard library only."""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+BIN = os.path.join(ROOT, "build/release/bin")
+ROOM = os.path.join(ROOT, "testdata/scenes/interior.glb")
+ROOM_REFERENCE = os.path.join(ROOT, "testdata/references/interior_256.exr")
+
+
+def _end(command, done):
+    sys.exit(f"{os.path.relpath(sys.argv[0])}: exit code {done.returncode} from: {shlex.join(command)}\n{done.stderr}")
+
+
+def _start(command):
+    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def run(*command):
+    """What the command prints. A failure ends everything, with the command's own words on standard error."""
+    command = [str(word) for word in command]
+    done = _start(command)
+    if done.returncode:
+        _end(command, done)
+    return done.stdout
+
+
+def sweep(programs, scene, folder, *options):
+    """Runs `vlx-compare sweep SCENE -o FOLDER OPTION...` without variations and regions; what FOLDER holds is not run again.
+    Returns its records (tools/sweep/sweep.h says what is in them), file names with FOLDER: (samplings, images), each in the order
+    of seeds, samples a pixel, methods. A method that fails ends everything."""
+    command = [str(word) for word in (os.path.join(programs, "vlx-compare"), "sweep", scene, "-o", folder, "--no-vary", "--inspect",
+                                      0, "--quiet", "--json", *options)]
+    done = _start(command)
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    for record in records:
+        if record["failure"]:
+            sys.exit(f"{os.path.relpath(sys.argv[0])}: {record['command']}: {record['failure']}")
+        if record["file"]:
+            record["file"] = os.path.join(folder, record["file"])
+    if done.returncode:
+        _end(command, done)
+    return [[r for r in records if r["kind"] == kind] for kind in ("sampling", "image")]
+
+
+def link(target, name):
+    """Gives a file another name, in place of what had it."""
+    if os.path.lexists(name):
+        os.remove(name)
+    os.symlink(os.path.relpath(target, os.path.dirname(name)), name)
