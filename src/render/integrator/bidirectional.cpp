@@ -7,9 +7,9 @@ namespace vlx::render {
 BidirectionalTracer::BidirectionalTracer(const Scene& scene, const Accelerator& accelerator, const View& view,
                                          const Window& window, const PathOptions& options,
                                          Strategies strategies)
-    : scene_(scene),
+    : Integrator(view, options.effects),
+      scene_(scene),
       accelerator_(accelerator),
-      view_(view),
       window_(window),
       options_(options),
       strategies_(strategies),
@@ -95,7 +95,7 @@ BidirectionalTracer::Found BidirectionalTracer::connection(const Vertex& eye, co
 
 void BidirectionalTracer::splat(const Vertex& light, Vec2 lens, float time, std::uint32_t seed,
                                 std::vector<Splat>& splats) const {
-    const View::Projection seen = view_.project(light.position(), lens, time);
+    const View::Projection seen = view().project(light.position(), lens, time);
     if (!(seen.density > 0) || !(std::abs(seen.x) < 1e9f) || !(std::abs(seen.y) < 1e9f)) return;
     if (!window_.contains(static_cast<int>(std::floor(seen.x)), static_cast<int>(std::floor(seen.y)))) return;
     const Vec3 to = seen.origin - light.position();
@@ -120,21 +120,22 @@ void BidirectionalTracer::splat(const Vertex& light, Vec2 lens, float time, std:
     if (!isBlack(radiance)) splats.push_back({seen.x, seen.y, radiance, spreadOf(w, byPath)});
 }
 
-PathSample BidirectionalTracer::trace(float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                                      std::vector<Splat>& splats, Rgb* pathSquares) const {
+PathSample BidirectionalTracer::traceRay(const Ray& start, Vec2 lens, const PathSampler& sampler,
+                                         std::vector<Splat>& splats, Rgb* pathSquares) const {
+    const float time = start.time;
     const std::vector<Vertex> light = lightSubpath(sampler, time);
     const std::uint32_t seed = hashesOpacity_ ? sampler.hashSeed(dimension::kOpacity) : 0;
     std::uint32_t rays = 0x40000000u;  // of connections; each has its own opacity
     if (!light.empty()) {
-        const Vec2 u = view_.hasLens() ? sampler.pair(dimension::kLightLens) : Vec2{};
+        const Vec2 u = view().hasLens() ? sampler.pair(dimension::kLightLens) : Vec2{};
         for (const Vertex& v : light)
             if (v.side.bsdf.hasSmoothLobe()) splat(v, u, time, seed + rays++, splats);
     }
 
     PathSample result;
-    Ray ray = view_.ray(x, y, lens, time);
+    Ray ray = start;
     Rgb throughput{1, 1, 1};
-    const float density = view_.project(ray.origin + ray.direction, lens, time).density;
+    const float density = view().project(ray.origin + ray.direction, lens, time).density;
     double vcm = mis(static_cast<double>(window_.pixels()) / density), vc = 0;
     bool lightsSampled = false;  // at the vertex before
     LightSampler::Local local;   // estimates there

@@ -26,8 +26,10 @@ bool covers(const Features& kernel, const Features& wanted) {
 
 }  // namespace
 
-PathTracer::PathTracer(const Scene& scene, const Accelerator& accelerator, const PathOptions& options)
-    : scene_(scene),
+PathTracer::PathTracer(const Scene& scene, const Accelerator& accelerator, const View& view,
+                       const PathOptions& options)
+    : Integrator(view, options.effects),
+      scene_(scene),
       accelerator_(accelerator),
       options_(options),
       lights_(scene, options.effects == EffectSet::all()),
