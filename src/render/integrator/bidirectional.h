@@ -2,9 +2,8 @@
 
 #include <vector>
 
-#include "render/integrator/integrator.h"
+#include "render/integrator/path_context.h"
 #include "render/light/light_emitter.h"
-#include "render/light/light_sampler.h"
 
 namespace vlx::render {
 
@@ -39,41 +38,20 @@ class BidirectionalTracer final : public Integrator {
                         Strategies strategies = Strategies::All);
 
   private:
-    struct Vertex;
-    /// Weighed radiance of a path, and as Splat::spread.
-    struct Found {
-        Rgb radiance;
-        float spread = 0;
-    };
+    struct LightVertex;
+    class EyeEstimate;
 
     PathSample traceRay(const Ray& start, Vec2 lens, const PathSampler& sampler, std::vector<Splat>& splats,
                         Rgb* pathSquares) const override;
-    std::vector<Vertex> lightSubpath(const PathSampler& sampler, float time) const;
-    Found directLight(const Vertex& eye, const LightSampler::Local& local, float choice, Vec2 u, float time,
-                      std::uint32_t seed) const;
-    Found connection(const Vertex& eye, const Vertex& light, float time, std::uint32_t seed) const;
-    void splat(const Vertex& light, Vec2 lens, float time, std::uint32_t seed,
+    std::vector<LightVertex> lightSubpath(const PathSampler& sampler, float time) const;
+    void splat(const LightVertex& light, Vec2 lens, float time, std::uint32_t seed,
                std::vector<Splat>& splats) const;
-    /// Density (per solid angle; of finite delta lights per area) with which next-event estimation at a
-    /// receiver would have chosen a light that is met in `direction`.
-    double directDensity(const LightSampler::Local& local, std::size_t light, std::uint32_t triangle,
-                         const Vec3& direction, float distance, float cosLight) const;
     float weight(Strategies own, double others) const;
-    /// Density of a strategy over its weight and PathTracer's density, whose squares (over its own) add up to
-    /// `byPath`.
-    static float spreadOf(float weight, double byPath) {
-        return weight > 0 && byPath > 0 ? static_cast<float>(1 / (weight * std::sqrt(byPath))) : 0;
-    }
 
-    const Scene& scene_;
-    const Accelerator& accelerator_;
+    PathContext context_;
     Window window_;
-    PathOptions options_;
     Strategies strategies_;
-    LightSampler lights_;
     LightEmitter emitter_;
-    bool absorbs_;
-    bool hashesOpacity_;
 };
 
 }  // namespace vlx::render
