@@ -39,9 +39,10 @@ vlx::Fingerprint inputs(const TraceOptions& o) {
 IntegratorChoice chooseIntegrator(const TraceOptions& o, const Scene& loaded,
                                   const Accelerator& accelerator) {
     if (o.integrator != IntegratorRequest::Auto)
-        return {o.integrator == IntegratorRequest::Path ? Integrator::Path : Integrator::Bidirectional,
-                "asked for", false};
-    if (o.targetError > 0) return {Integrator::Path, "--target-error judges by path tracing", false};
+        return {
+            o.integrator == IntegratorRequest::Path ? IntegratorKind::Path : IntegratorKind::Bidirectional,
+            "asked for", false};
+    if (o.targetError > 0) return {IntegratorKind::Path, "--target-error judges by path tracing", false};
     // With --time as many samples as take a second are worth a pilot.
     const double samples = o.timeLimit > 0 ? o.timeLimit * 2e5 : o.render.spp;
     const vlx::Window whole{0, 0, o.render.width, o.render.height};
@@ -66,7 +67,7 @@ void chooseSamples(TraceOptions& o, const Scene& loaded, const Accelerator& acce
     const double rounded =
         replicates * (o.timeLimit > 0 ? std::floor(wanted / replicates) : std::ceil(wanted / replicates));
     o.render.spp = static_cast<int>(std::clamp(rounded, replicates, most));
-    if (o.render.integrator == Integrator::Bidirectional)
+    if (o.render.integrator == IntegratorKind::Bidirectional)
         while (o.render.splatReplicates() == 0 && o.render.spp > 1) --o.render.spp;
     note(o, std::to_string(o.render.spp) + " samples a pixel");
 }
@@ -122,7 +123,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     o.render.integrator = choice.chosen;
     o.render.integratorReason = std::string(nameOf(choice.chosen)) + ": " + choice.reason;
     if (const auto fault = o.render.validate(loaded)) throw CLI::ValidationError(*fault);
-    if (choice.tried || choice.chosen == Integrator::Bidirectional)
+    if (choice.tried || choice.chosen == IntegratorKind::Bidirectional)
         note(o, "integrator " + o.render.integratorReason);
 
     if (o.timeLimit > 0 || o.targetError > 0) chooseSamples(o, loaded, accelerator);

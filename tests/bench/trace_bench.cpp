@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "render/film/region_sampling.h"
-#include "render/integrator/path_tracer.h"
+#include "render/integrator/integrator.h"
 #include "render/plan/plan.h"
 #include "render/scene/accelerator.h"
 #include "render/scene/scene_loader.h"
@@ -22,10 +22,11 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
 }
 
 /// One sample in each pixel.
-void trace(const PathTracer& tracer, const View& view) {
+void trace(const Integrator& integrator) {
     Rgb sum;
+    std::vector<Splat> splats;
     sampleUniformly({0, 0, kSize, kSize}, 1, 1, 1, [&](const CameraSample& s) {
-        const Rgb v = tracer.trace(view.ray(s.x, s.y, {}), PathSampler(s.seed, s.index)).radiance;
+        const Rgb v = integrator.trace(s, splats).radiance;
         sum += v;
         return v;
     });
@@ -72,17 +73,18 @@ void TracerAgainstBareEmbree(benchmark::State& state) {
     PathOptions options;
     options.effects = plan.planned;
     Accelerator accelerator(scene, plan.planned);
-    const PathTracer tracer(scene, accelerator, options);
     const View view(scene.cameras[scene.activeCamera], kSize, kSize);
+    const auto integrator =
+        makeIntegrator(IntegratorKind::Path, scene, accelerator, view, {0, 0, kSize, kSize}, options);
     std::vector<RecordedRay> rays;
     accelerator.record(&rays);
-    trace(tracer, view);
+    trace(*integrator);
     accelerator.record(nullptr);
 
     double tracing = 0, shooting = 0;
     for ([[maybe_unused]] auto iteration : state) {
         auto start = std::chrono::steady_clock::now();
-        trace(tracer, view);
+        trace(*integrator);
         const double t = secondsSince(start);
         start = std::chrono::steady_clock::now();
         shoot(static_cast<RTCScene>(accelerator.embreeScene()), rays);

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
-
+#include "render/film/region_sampling.h"
 #include "test_scene.h"
 #include "variolux/base/hash.h"
 
@@ -27,13 +26,11 @@ struct Quarters {
     std::array<double, 4> error{};
 };
 
-using Tracing = std::function<void(float x, float y, Vec2 lens, float time, const PathSampler&,
-                                   const std::function<void(float, float, const Rgb&)>& add)>;
-
-Quarters quarters(const Tracing& trace, int blocks = kBlocks, int samples = kSamples) {
+Quarters quarters(const Integrator& integrator, int samples = kSamples) {
     Quarters q;
+    std::vector<Splat> splats;
     std::array<double, 4> squares{};
-    for (int block = 0; block < blocks; ++block) {
+    for (int block = 0; block < kBlocks; ++block) {
         std::array<double, 4> sum{};
         const auto add = [&](float x, float y, const Rgb& v) {
             const std::size_t quarter = (x >= kSide / 2 ? 1 : 0) + (y >= kSide / 2 ? 2 : 0);
@@ -41,18 +38,20 @@ Quarters quarters(const Tracing& trace, int blocks = kBlocks, int samples = kSam
         };
         for (int pixel = 0; pixel < kSide * kSide; ++pixel)
             for (int i = 0; i < samples; ++i) {
-                const PathSampler sampler(hashOf(block, pixel, 11), static_cast<std::uint32_t>(i));
-                const Vec2 u = sampler.pair(dimension::kPixel);
-                trace(static_cast<float>(pixel % kSide) + u.x, static_cast<float>(pixel / kSide) + u.y,
-                      sampler.pair(dimension::kLens), sampler.pair(dimension::kTime).x, sampler, add);
+                const CameraSample sample = sampleInPixel(
+                    pixel % kSide, pixel / kSide, hashOf(block, pixel, 11), static_cast<std::uint32_t>(i));
+                add(sample.x, sample.y, integrator.trace(sample, splats).radiance);
+                // Sums over all light subpaths, kSide^2 for each camera sample of a pixel.
+                for (const Splat& s : splats) add(s.x, s.y, s.radiance / (kSide * kSide));
+                splats.clear();
             }
         for (std::size_t i = 0; i < 4; ++i) {
-            q.mean[i] += sum[i] / blocks;
-            squares[i] += sum[i] * sum[i] / blocks;
+            q.mean[i] += sum[i] / kBlocks;
+            squares[i] += sum[i] * sum[i] / kBlocks;
         }
     }
     for (std::size_t i = 0; i < 4; ++i)
-        q.error[i] = std::sqrt(std::max(0.0, squares[i] - q.mean[i] * q.mean[i]) / (blocks - 1));
+        q.error[i] = std::sqrt(std::max(0.0, squares[i] - q.mean[i] * q.mean[i]) / (kBlocks - 1));
     return q;
 }
 
@@ -61,23 +60,11 @@ struct Setting {
         : scene(t.finish()), accelerator(scene), view(scene.cameras[0], kSide, kSide), options(o) {}
 
     Quarters byPath(int samples = kSamples) const {
-        const PathTracer tracer(scene, accelerator, options);
-        return quarters(
-            [&](float x, float y, Vec2 lens, float time, const PathSampler& sampler, const auto& add) {
-                add(x, y, tracer.trace(view.ray(x, y, lens, time), sampler).radiance);
-            },
-            kBlocks, samples);
+        return quarters(PathTracer(scene, accelerator, view, options), samples);
     }
     Quarters bidirectional(Strategies strategies = Strategies::All) const {
-        const BidirectionalTracer tracer(scene, accelerator, view, {0, 0, kSide, kSide}, options, strategies);
-        std::vector<Splat> splats;
         return quarters(
-            [&](float x, float y, Vec2 lens, float time, const PathSampler& sampler, const auto& add) {
-                add(x, y, tracer.trace(x, y, lens, time, sampler, splats).radiance);
-                // Sums over all light subpaths, kSide^2 for each camera sample of a pixel.
-                for (const Splat& s : splats) add(s.x, s.y, s.radiance / (kSide * kSide));
-                splats.clear();
-            });
+            BidirectionalTracer(scene, accelerator, view, {0, 0, kSide, kSide}, options, strategies));
     }
 
     Scene scene;

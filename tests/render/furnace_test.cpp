@@ -2,7 +2,8 @@
 
 #include <functional>
 
-#include "render/integrator/bidirectional.h"
+#include "render/film/region_sampling.h"
+#include "render/integrator/integrator.h"
 #include "test_scene.h"
 #include "variolux/base/hash.h"
 
@@ -29,13 +30,12 @@ struct Pixel {
     double error = 0;
 };
 
-std::vector<Pixel> rendered(const Scene& scene, bool bidirectional) {
+std::vector<Pixel> rendered(const Scene& scene, IntegratorKind kind) {
     const Accelerator accelerator(scene);
     const View view(scene.cameras[0], kSide, kSide);
     PathOptions options;
     options.maxBounces = 100;
-    const PathTracer path(scene, accelerator, options);
-    const BidirectionalTracer both(scene, accelerator, view, {0, 0, kSide, kSide}, options);
+    const auto integrator = makeIntegrator(kind, scene, accelerator, view, {0, 0, kSide, kSide}, options);
     std::vector<Pixel> pixels(kSide * kSide);
     std::vector<char> covered(pixels.size(), 1);
     for (int block = 0; block < kBlocks; ++block) {
@@ -43,12 +43,10 @@ std::vector<Pixel> rendered(const Scene& scene, bool bidirectional) {
         std::vector<Splat> splats;
         for (std::size_t pixel = 0; pixel < sum.size(); ++pixel)
             for (int i = 0; i < kSamples; ++i) {
-                const PathSampler sampler(hashOf(block, pixel, 3), static_cast<std::uint32_t>(i));
-                const Vec2 u = sampler.pair(dimension::kPixel);
-                const float x = static_cast<float>(pixel % kSide) + u.x,
-                            y = static_cast<float>(pixel / kSide) + u.y;
-                const PathSample s = bidirectional ? both.trace(x, y, {}, 0, sampler, splats)
-                                                   : path.trace(view.ray(x, y, {}), sampler);
+                const PathSample s = integrator->trace(
+                    sampleInPixel(static_cast<int>(pixel % kSide), static_cast<int>(pixel / kSide),
+                                  hashOf(block, pixel, 3), static_cast<std::uint32_t>(i)),
+                    splats);
                 sum[pixel] += s.radiance.y;
                 covered[pixel] = covered[pixel] && s.hit;
             }
@@ -110,14 +108,14 @@ void expectWhite(const std::function<void(TestScene&, std::uint32_t material)>& 
                  const std::function<void(Material&)>& change = {}, bool glass = true) {
     for (auto& [name, material] : finishes()) {
         if (material.transmission > 0 && !glass) continue;
-        for (const bool bidirectional : {false, true}) {
-            SCOPED_TRACE(std::string(name) + (bidirectional ? ", bidirectional" : ", path"));
+        for (const auto kind : {IntegratorKind::Path, IntegratorKind::Bidirectional}) {
+            SCOPED_TRACE(std::string(name) + (kind == IntegratorKind::Path ? ", path" : ", bidirectional"));
             TestScene t;
             Material m = material;
             if (change) change(m);
             object(t, t.material(m));
             t.environment(Environment(Rgb(1)));
-            const std::vector<Pixel> pixels = rendered(t.finish(), bidirectional);
+            const std::vector<Pixel> pixels = rendered(t.finish(), kind);
             ASSERT_GT(pixels.size(), 20u);
             double sum = 0;
             for (const Pixel& p : pixels) {

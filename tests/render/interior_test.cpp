@@ -3,7 +3,7 @@
 #include <array>
 
 #include "render/film/region_sampling.h"
-#include "render/integrator/path_tracer.h"
+#include "render/integrator/integrator.h"
 #include "render/scene/accelerator.h"
 #include "render/scene/scene_loader.h"
 #include "variolux/base/image_io.h"
@@ -14,13 +14,15 @@ namespace {
 
 /// The demo room by its default camera, the plain mean of `spp` samples.
 Image render(const Scene& scene, const Accelerator& accelerator, int size, int spp) {
-    const PathTracer tracer(scene, accelerator, {});
     const View view(scene.cameras[scene.activeCamera], size, size);
+    const auto integrator =
+        makeIntegrator(IntegratorKind::Path, scene, accelerator, view, {0, 0, size, size}, {});
     Image image({0, 0, size, size}, {"R", "G", "B"});
     parallelFor(0, size, [&](std::int64_t row) {
         const int y = static_cast<int>(row);
+        std::vector<Splat> splats;
         sampleUniformly({0, y, size, 1}, spp, 1, 17, [&](const CameraSample& s) {
-            const Rgb v = tracer.trace(view.ray(s.x, s.y, {}), PathSampler(s.seed, s.index)).radiance;
+            const Rgb v = integrator->trace(s, splats).radiance;
             float* p = image.at(s.column, s.row);
             p[0] += v.x / static_cast<float>(spp);
             p[1] += v.y / static_cast<float>(spp);

@@ -370,10 +370,10 @@ TEST(Features, AreTakenAtTheFirstHitThatIsNotSmooth) {
     t.environment(Environment(Rgb(1)));
     const Scene scene = t.finish();
     const Accelerator accelerator(scene);
-    const PathTracer tracer(scene, accelerator, {});
+    const PathTracer tracer(scene, accelerator, View(Camera{}, 1, 1), {});
     int through = 0;
     for (std::uint32_t i = 0; i < 100; ++i) {
-        const PathSample s = tracer.trace({{0, 0, 3}, {0, 0, -1}}, PathSampler(i, 0));
+        const PathSample s = tracer.along({{0, 0, 3}, {0, 0, -1}}, PathSampler(i, 0));
         EXPECT_TRUE(s.hit);
         EXPECT_NEAR(s.depth, 2.8f, 1e-5f);  // of the glass
         if (s.normal == Vec3{}) {
@@ -386,7 +386,7 @@ TEST(Features, AreTakenAtTheFirstHitThatIsNotSmooth) {
         EXPECT_EQ(s.normal, (Vec3{0, 0, 1}));
     }
     EXPECT_GT(through, 80);
-    const PathSample miss = tracer.trace({{0, 0, 3}, {0, 0, 1}}, PathSampler(0, 0));
+    const PathSample miss = tracer.along({{0, 0, 3}, {0, 0, 1}}, PathSampler(0, 0));
     EXPECT_FALSE(miss.hit);
     EXPECT_EQ(miss.depth, 0);
     EXPECT_EQ(miss.albedo, (Rgb{1, 1, 1}));

@@ -259,24 +259,15 @@ Shot shoot(Scene scene, const std::string& effects, std::uint64_t seed = 1,
     applyPlan(scene, plan);
     options.follow(plan);
     const Accelerator accelerator(scene, options.path.effects);
-    const PathTracer tracer(scene, accelerator, options.path);
-    const View view(scene.cameras[0], kSide, kSide);
-    const bool lens = options.path.effects.has(DepthOfField);
-    const bool moves = options.path.effects.hasAny({CameraMotion, ObjectMotion});
+    const PathTracer tracer(scene, accelerator, View(scene.cameras[0], kSide, kSide), options.path);
     Shot shot;
     shot.kernel = tracer.features();
     for (auto& c : effectCounters) c = 0;
-    for (int i = 0; i < kSide * kSide; ++i) {
-        for (std::uint32_t s = 0; s < samples; ++s) {
-            const PathSampler sampler(hashOf(seed, i), s);
-            const Vec2 p = sampler.pair(dimension::kPixel);
-            const Vec2 u = lens ? sampler.pair(dimension::kLens) : Vec2{};
-            const float time = moves ? sampler.pair(dimension::kTime).x : 0;
-            shot.samples.push_back(tracer.trace(
-                view.ray(static_cast<float>(i % kSide) + p.x, static_cast<float>(i / kSide) + p.y, u, time),
-                sampler));
-        }
-    }
+    std::vector<Splat> splats;
+    for (int i = 0; i < kSide * kSide; ++i)
+        for (std::uint32_t s = 0; s < samples; ++s)
+            shot.samples.push_back(
+                tracer.trace(sampleInPixel(i % kSide, i / kSide, hashOf(seed, i), s), splats));
     for (std::size_t e = 0; e < kEffects; ++e) shot.counts[e] = effectCounters[e];
     return shot;
 }
@@ -557,13 +548,13 @@ TEST(Motion, AMovingSquareCoversPixelsForItsPartOfTheTime) {
     const Scene scene = finished(t);
     EXPECT_EQ(planOf(scene).simulated(), (std::vector<std::string>{"emissive_meshes", "object_motion"}));
     const Accelerator accelerator(scene);
-    const PathTracer tracer(scene, accelerator, {});
+    const PathTracer tracer(scene, accelerator, View(scene.cameras[0], kSide, kSide), {});
     for (const float x : {-1.2f, -0.8f, 0.f, 0.6f, 1.1f}) {
         double sum = 0;
         constexpr int n = 4096;
         for (int i = 0; i < n; ++i) {
             const float time = (static_cast<float>(i) + 0.5f) / n;
-            sum += tracer.trace({{x, 0.1f, 5}, {0, 0, -1}, time}, PathSampler(1, 0)).radiance.x;
+            sum += tracer.along({{x, 0.1f, 5}, {0, 0, -1}, time}, PathSampler(1, 0)).radiance.x;
         }
         // Covered while |x - (-0.8 + 1.6 t)| < 0.5.
         const double from = std::clamp((x - 0.5 + 0.8) / 1.6, 0.0, 1.0),

@@ -185,7 +185,7 @@ TEST(RenderOptions, ValidateNamesWhatIsWrong) {
 
 RenderOptions bidirectional() {
     RenderOptions options = small(false);
-    options.integrator = Integrator::Bidirectional;
+    options.integrator = IntegratorKind::Bidirectional;
     return options;
 }
 
@@ -236,7 +236,7 @@ TEST(RenderDumpBidirectional, CropsAndPicturesOfBothIntegratorsAgree) {
     options.seed = 8;
     options.spp = 64;
     renderDump(scene, accelerator, folder / "crop.exr", options);
-    options.integrator = Integrator::Path;
+    options.integrator = IntegratorKind::Path;
     options.replicates = 32;
     options.seed = 9;
     renderDump(scene, accelerator, folder / "path.exr", options);
@@ -296,9 +296,10 @@ TEST(ChooseIntegrator, FollowsLightThroughGlassWherePathsMissIt) {
         t.camera({0, 2.6f, 4.4f}, {0, 0.3f, 0}, 0.7f);
         const Scene scene = t.finish();
         const IntegratorChoice choice = choiceFor(scene, 1e6);
-        EXPECT_EQ(choice.chosen, glass ? Integrator::Bidirectional : Integrator::Path) << choice.reason;
+        EXPECT_EQ(choice.chosen, glass ? IntegratorKind::Bidirectional : IntegratorKind::Path)
+            << choice.reason;
         EXPECT_EQ(choice.tried, glass) << choice.reason;
-        EXPECT_EQ(choiceFor(scene, 100).chosen, Integrator::Path);
+        EXPECT_EQ(choiceFor(scene, 100).chosen, IntegratorKind::Path);
     }
 }
 
@@ -307,7 +308,7 @@ TEST(ChooseIntegrator, WithoutLightsIsPath) {
     t.box(t.material(TestScene::matte(Rgb(0.5f))), {-1, -1, -1}, {1, 1, 1});
     t.camera({0, 0, 0.5f}, {0, 0, 0}, 1);
     const IntegratorChoice choice = choiceFor(t.finish(), 1e6);
-    EXPECT_EQ(choice.chosen, Integrator::Path);
+    EXPECT_EQ(choice.chosen, IntegratorKind::Path);
     EXPECT_NE(choice.reason.find("no lights"), std::string::npos);
 }
 

@@ -148,10 +148,10 @@ struct Estimate {
 /// `samples` independent estimates (one index each of many seeds) along one ray.
 inline Estimate estimate(const Scene& scene, const Ray& ray, int samples, const PathOptions& options = {}) {
     const Accelerator accelerator(scene);
-    const PathTracer tracer(scene, accelerator, options);
+    const PathTracer tracer(scene, accelerator, View(Camera{}, 1, 1), options);
     std::array<double, 3> sum{}, squares{};
     for (int i = 0; i < samples; ++i) {
-        const Rgb v = tracer.trace(ray, PathSampler(hashOf(i, 5), 0)).radiance;
+        const Rgb v = tracer.along(ray, PathSampler(hashOf(i, 5), 0)).radiance;
         const std::array<double, 3> rgb{v.x, v.y, v.z};
         for (std::size_t c = 0; c < 3; ++c) {
             sum[c] += rgb[c];

@@ -46,16 +46,11 @@ class BandTracer::ChannelArrays {
     std::size_t count_;
 };
 
-BandTracer::BandTracer(const PathTracer& tracer, const BidirectionalTracer* both, const View& view,
-                       const RenderOptions& options, const DumpHeader& header)
-    : tracer_(tracer),
-      both_(both),
-      view_(view),
+BandTracer::BandTracer(const Integrator& integrator, const RenderOptions& options, const DumpHeader& header)
+    : integrator_(integrator),
       options_(options),
       header_(header),
       whole_(options.crop.value_or(header.display)),
-      lens_(options.path.effects.has(Effect::DepthOfField)),
-      time_(options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion})),
       seed_(options.seed),
       firstReplicate_(0) {
     if (options.earlier == nullptr) return;
@@ -124,14 +119,6 @@ void BandTracer::allocate(SampleBand& band) const {
     }
 }
 
-PathSample BandTracer::traced(const CameraSample& s, std::vector<Splat>& splats) const {
-    const PathSampler sampler(s.seed, s.index);
-    const Vec2 lens = lens_ ? sampler.pair(dimension::kLens) : Vec2{};
-    const float time = time_ ? sampler.pair(dimension::kTime).x : 0;
-    return both_ != nullptr ? both_->trace(s.x, s.y, lens, time, sampler, splats)
-                            : tracer_.trace(view_.ray(s.x, s.y, lens, time), sampler);
-}
-
 void BandTracer::traceRegion(int rx, int ry, const Window& rows, RegionResult& out,
                              const ChannelArrays* direct) const {
     out.window = clipped(rx, ry, rows);
@@ -142,7 +129,7 @@ void BandTracer::traceRegion(int rx, int ry, const Window& rows, RegionResult& o
     std::vector<Splat> splats;
     const int left = rx * kRegionSize, top = ry * kRegionSize;
     const Shade shade = [&](const CameraSample& s) {
-        PathSample sample = traced(s, splats);
+        PathSample sample = integrator_.trace(s, splats);
         const bool outside = !rows.contains(s.column, s.row);  // of the band: another band's sample
         for (const Splat& splat : splats)
             out.splats.push_back({static_cast<int>(std::floor(splat.x)),
@@ -175,7 +162,8 @@ void BandTracer::traceRegion(int rx, int ry, const Window& rows, RegionResult& o
         sampleCounts(
             out.window, [&](int, int) { return options_.spp; }, firstReplicate_, seed_, shade);
     } else {
-        const int replicates = both_ != nullptr ? header_.splatReplicates : options_.replicates;
+        const bool both = options_.integrator == IntegratorKind::Bidirectional;
+        const int replicates = both ? header_.splatReplicates : options_.replicates;
         sampleUniformly(out.window, options_.spp, replicates, options_.seed, shade);
     }
 }

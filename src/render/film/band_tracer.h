@@ -7,7 +7,7 @@
 
 #include "render/film/region_sampling.h"
 #include "render/film/render.h"
-#include "render/integrator/bidirectional.h"
+#include "render/integrator/integrator.h"
 #include "variolux/dump/band.h"
 #include "variolux/dump/writer.h"
 
@@ -43,8 +43,7 @@ inline int floorToRegion(int v) { return v / kRegionSize * kRegionSize; }
 /// Traces a picture band by band: whole regions in parallel, then their samples in the band's order.
 class BandTracer {
   public:
-    BandTracer(const PathTracer& tracer, const BidirectionalTracer* both, const View& view,
-               const RenderOptions& options, const DumpHeader& header);
+    BandTracer(const Integrator& integrator, const RenderOptions& options, const DumpHeader& header);
 
     /// Traces the rows of `rows` (the data window's columns).
     SampleBand trace(const Window& rows, const std::function<void(std::int64_t)>& regionDone);
@@ -59,21 +58,16 @@ class BandTracer {
 
     SampleBand bandOf(const Window& rows) const;
     void allocate(SampleBand& band) const;
-    PathSample traced(const CameraSample& s, std::vector<Splat>& splats) const;
     /// Into the region's records, or straight into the band.
     void traceRegion(int rx, int ry, const Window& rows, RegionResult& out,
                      const ChannelArrays* direct) const;
     /// The regions' samples in the band's order: pixel by pixel, each pixel's in the order they were taken.
     void gather(const Window& rows, SampleBand& band) const;
 
-    const PathTracer& tracer_;
-    const BidirectionalTracer* both_;
-    const View& view_;
+    const Integrator& integrator_;
     const RenderOptions& options_;
     const DumpHeader& header_;
     Window whole_;  // the picture's part, whatever the band
-    bool lens_;
-    bool time_;
     std::uint64_t seed_;
     std::uint32_t firstReplicate_;
     std::vector<RegionResult> regions_;

@@ -196,6 +196,11 @@ void samplePixel(int column, int row, int count, std::uint32_t replicate, std::u
 
 }  // namespace
 
+CameraSample sampleInPixel(int column, int row, std::uint64_t seed, std::uint32_t index) {
+    const Vec2 u = PathSampler(seed, index).pair(dimension::kPixel);
+    return {column, row, static_cast<float>(column) + u.x, static_cast<float>(row) + u.y, seed, index};
+}
+
 void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_t seed, const Shade& shade) {
     assert(replicates > 0 && spp % replicates == 0);
     for (int row = window.y; row < window.y + window.height; ++row)

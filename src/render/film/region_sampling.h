@@ -5,23 +5,16 @@
 #include <vector>
 
 #include "render/math/vec.h"
+#include "render/scene/camera.h"
 #include "variolux/base/window.h"
 
 namespace vlx::render {
 
-/// One sample to take: a position on the image plane, and which numbers the path uses.
-struct CameraSample {
-    int column = 0;  ///< its pixel
-    int row = 0;
-    float x = 0;  ///< raster position inside the pixel
-    float y = 0;
-    std::uint64_t seed = 0;       ///< of the pixel's (replicate's) randomisation
-    std::uint32_t index = 0;      ///< among the pixel's (replicate's) samples
-    std::uint32_t replicate = 0;  ///< independent randomisation it belongs to
-};
-
 /// Takes a sample and returns its radiance.
 using Shade = std::function<Rgb(const CameraSample&)>;
+
+/// Sample `index` of a pixel's randomisation, `seed`: somewhere in the pixel.
+CameraSample sampleInPixel(int column, int row, std::uint64_t seed, std::uint32_t index);
 
 /// Side of a region in pixels.
 inline constexpr int kRegionSize = 4;

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "render/film/band_tracer.h"
-#include "render/integrator/bidirectional.h"
 #include "variolux/base/error.h"
 #include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
@@ -31,7 +30,7 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     DumpHeader header;
     header.display = {0, 0, options.width, options.height};
     header.data = options.crop.value_or(header.display);
-    if (options.integrator == Integrator::Bidirectional) {
+    if (options.integrator == IntegratorKind::Bidirectional) {
         header.splatReplicates = options.splatReplicates();
         header.replicatesShare = true;
     }
@@ -126,7 +125,7 @@ std::optional<std::string> RenderOptions::validate(const Scene& scene) const {
         return "hierarchical sampling neither follows a sample map nor adds to a dump";
     if (replicates != 1 && (map != nullptr || earlier != nullptr))
         return "samples of a map, or added to a dump, are one randomisation, not replicates";
-    if (integrator == Integrator::Bidirectional) {
+    if (integrator == IntegratorKind::Bidirectional) {
         if (hierarchical || map != nullptr || earlier != nullptr)
             return "bidirectional tracing takes as many samples in each pixel: it goes with neither "
                    "hierarchical sampling nor a sample map nor an earlier dump";
@@ -152,7 +151,6 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
                         const RenderOptions& options, const Progress& progress) {
     assert(!options.validate(scene));
     const View view(scene.cameras[options.camera], options.width, options.height);
-    const PathTracer tracer(scene, accelerator, options.path);
     DumpHeader header = headerOf(scene, view, options);
     if (options.earlier != nullptr) options.earlier->checkSameView(header);
     const Window window = header.data = bandOf(header.data, options.band);
@@ -160,13 +158,11 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
         throw Error(path, "expected at most as many bands as rows, found " +
                               std::to_string(options.band.count) + " bands");
     DumpWriter writer(path, header);
-    std::optional<BidirectionalTracer> both;
     std::optional<SplatImages> splats;
-    if (options.integrator == Integrator::Bidirectional) {
-        both.emplace(scene, accelerator, view, window, options.path);
-        splats.emplace(window, header.splatReplicates);
-    }
-    BandTracer bands(tracer, both ? &*both : nullptr, view, options, header);
+    if (options.integrator == IntegratorKind::Bidirectional) splats.emplace(window, header.splatReplicates);
+    const std::unique_ptr<Integrator> integrator =
+        makeIntegrator(options.integrator, scene, accelerator, view, window, options.path);
+    BandTracer bands(*integrator, options, header);
 
     const std::int64_t mostSpp = options.hierarchical
                                      ? std::int64_t{1} << (2 * (options.refinement.levels - 1))

@@ -7,7 +7,7 @@
 #include "render/film/append.h"
 #include "render/film/region_sampling.h"
 #include "render/film/sample_map.h"
-#include "render/integrator/path_tracer.h"
+#include "render/integrator/integrator.h"
 #include "render/plan/plan.h"
 #include "render/scene/scene.h"
 #include "variolux/base/progress.h"
@@ -15,8 +15,6 @@
 #include "variolux/dump/format.h"
 
 namespace vlx::render {
-
-enum class Integrator { Path, Bidirectional };
 
 struct RenderOptions {
     int width = 512;  ///< of the whole picture, in pixels
@@ -32,7 +30,7 @@ struct RenderOptions {
     const SampleMap* map = nullptr;        ///< where the samples are wanted; spp is then their mean
     const EarlierDump* earlier = nullptr;  ///< whose samples are to be kept, before the new ones
     PathOptions path;
-    Integrator integrator = Integrator::Path;
+    IntegratorKind integrator = IntegratorKind::Path;
     std::string integratorReason;  ///< for the header, when not empty
     DumpCompression compression = DumpCompression::Rle;
     std::string version;       ///< of the program, for the header

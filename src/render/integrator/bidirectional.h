@@ -2,20 +2,10 @@
 
 #include <vector>
 
-#include "render/integrator/path_tracer.h"
+#include "render/integrator/path_context.h"
 #include "render/light/light_emitter.h"
-#include "render/scene/camera.h"
-#include "variolux/base/window.h"
 
 namespace vlx::render {
-
-/// Light that a light subpath brings to a place of the picture.
-struct Splat {
-    float x = 0;  ///< raster position, inside the window
-    float y = 0;
-    Rgb radiance;      ///< to be divided by the number of light subpaths for each pixel of the window
-    float spread = 0;  ///< radiance^2 x spread: part of the second moment of path tracing (pathSquares)
-};
 
 /// Which strategies of a bidirectional tracer count, by their number of light vertices s and eye vertices t
 /// (the camera included). All is the one to use; the others are for tests: each weighs 1, and all agree on
@@ -39,57 +29,29 @@ enum class Strategies {
 ///   one may also go on behind it.
 /// Caustics of lights without an extent are left out, as PathTracer cannot find them.
 /// Solids inside one another may take absorption from the wrong one on the light's way. General kernel only;
-/// effects that are left out must be the scene's or lobes of surfaces, not caustics. Refers to scene,
-/// accelerator and view, which must outlive it; safe to use from many threads.
-class BidirectionalTracer {
+/// effects that are left out must be the scene's or lobes of surfaces, not caustics.
+class BidirectionalTracer final : public Integrator {
   public:
     /// `window`: the pixels whose camera samples are traced; splats fall inside it.
     BidirectionalTracer(const Scene& scene, const Accelerator& accelerator, const View& view,
                         const Window& window, const PathOptions& options,
                         Strategies strategies = Strategies::All);
 
-    /// Of a camera sample through raster (x, y) at a point of the lens; t >= 2 in the result, t = 1 appended
-    /// to `splats`. To `pathSquares` is added, if it is given, what together with radiance^2 x spread of the
-    /// splats estimates the second moment of a sample of PathTracer's, without products of different paths:
-    /// f^2 / p over all paths f found, p being the density with which PathTracer would have.
-    PathSample trace(float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                     std::vector<Splat>& splats, Rgb* pathSquares = nullptr) const;
-
   private:
-    struct Vertex;
-    /// Weighed radiance of a path, and as Splat::spread.
-    struct Found {
-        Rgb radiance;
-        float spread = 0;
-    };
+    struct LightVertex;
+    class EyeEstimate;
 
-    std::vector<Vertex> lightSubpath(const PathSampler& sampler, float time) const;
-    Found directLight(const Vertex& eye, const LightSampler::Local& local, float choice, Vec2 u, float time,
-                      std::uint32_t seed) const;
-    Found connection(const Vertex& eye, const Vertex& light, float time, std::uint32_t seed) const;
-    void splat(const Vertex& light, Vec2 lens, float time, std::uint32_t seed,
+    PathSample traceRay(const Ray& start, Vec2 lens, const PathSampler& sampler, std::vector<Splat>& splats,
+                        Rgb* pathSquares) const override;
+    std::vector<LightVertex> lightSubpath(const PathSampler& sampler, float time) const;
+    void splat(const LightVertex& light, Vec2 lens, float time, std::uint32_t seed,
                std::vector<Splat>& splats) const;
-    /// Density (per solid angle; of finite delta lights per area) with which next-event estimation at a
-    /// receiver would have chosen a light that is met in `direction`.
-    double directDensity(const LightSampler::Local& local, std::size_t light, std::uint32_t triangle,
-                         const Vec3& direction, float distance, float cosLight) const;
     float weight(Strategies own, double others) const;
-    /// Density of a strategy over its weight and PathTracer's density, whose squares (over its own) add up to
-    /// `byPath`.
-    static float spreadOf(float weight, double byPath) {
-        return weight > 0 && byPath > 0 ? static_cast<float>(1 / (weight * std::sqrt(byPath))) : 0;
-    }
 
-    const Scene& scene_;
-    const Accelerator& accelerator_;
-    const View& view_;
+    PathContext context_;
     Window window_;
-    PathOptions options_;
     Strategies strategies_;
-    LightSampler lights_;
     LightEmitter emitter_;
-    bool absorbs_;
-    bool hashesOpacity_;
 };
 
 }  // namespace vlx::render

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "render/integrator/bidirectional.h"
-#include "render/integrator/path_kernel.h"
+#include "render/integrator/walk.h"
 
 // How MIS is done. A path is a product of densities, one for each strategy; what is wanted is their sum over
 // that of the strategy at hand. Two numbers for each subpath, vcm and vc, hold the sums over the strategies
@@ -13,23 +13,43 @@
 /// Vertices of the bidirectional tracer's subpaths, and the quantities of MIS that they carry.
 namespace vlx::render {
 
+/// Of the general kernel.
+using GeneralWalk = Walk<kEveryFeature>;
+
 inline double mis(double density) { return density * density; }
 
-/// A surface as seen from one direction.
-struct Side {
-    Side(const Scene& scene, const SurfacePoint& seen, const SurfaceParameters& surface, const Vec3& viewer)
-        : point(seen),
-          frame(seen.shadingNormal),
-          wo(frame.toLocal(viewer)),
-          bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, seen.fromBehind, scene.albedoTables[0],
-               frame.toLocal(seen.geometricNormal)) {}
+/// What MIS has to know of a subpath.
+struct MisSums {
+    double vcm = 0;
+    double vc = 0;
+    // The same over the strategies s = 0 and s = 1 only, PathTracer's; of light subpaths.
+    double pathVcm = 0;
+    double pathVc = 0;
 
-    BsdfValue evaluate(const Vec3& direction) const { return bsdf.evaluate(frame.toLocal(direction)); }
+    /// Turns densities per solid angle at the vertex before into densities per area at this one, `cosine`
+    /// being that of the direction back.
+    void arrive(double distanceSquared, float cosine) {
+        const double cosHere = mis(std::max(cosine, 1e-9f));
+        vcm *= mis(distanceSquared) / cosHere;
+        vc /= cosHere;
+        pathVc /= cosHere;
+    }
 
-    SurfacePoint point;
-    Frame frame;
-    Vec3 wo;
-    Bsdf bsdf;
+    /// Goes on in a direction at `cosine`, chosen as `next` says; `reverse`: the density of the direction
+    /// back, coming from there.
+    void scatter(const BsdfSample& next, float cosine, double reverse) {
+        if (next.delta) {
+            vcm = 0;
+            vc *= mis(cosine);
+            pathVc *= mis(cosine);
+        } else {
+            const double turned = mis(cosine / static_cast<double>(next.pdf));
+            vc = turned * (vc * mis(reverse) + vcm);
+            pathVc = turned * (pathVc * mis(reverse) + pathVcm);
+            vcm = mis(1 / static_cast<double>(next.pdf));
+        }
+        pathVcm = 0;
+    }
 };
 
 /// The receiver of direct light: the same whatever direction it is seen from on one side.
@@ -37,38 +57,11 @@ inline Receiver receiverAt(const SurfacePoint& point) {
     return {point.position, point.geometricNormal, point.material->transmissive()};
 }
 
-struct BidirectionalTracer::Vertex {
-    Side side;  ///< as seen from the vertex before
-    SurfaceParameters surface;
-    Vec3 back;       ///< unit, to the vertex before
-    Rgb throughput;  ///< of light subpaths: divided by the cosine with `back`
-    double vcm = 0;
-    double vc = 0;
-    // The same over the strategies s = 0 and s = 1 only, PathTracer's; of light subpaths.
-    double pathVcm = 0;
-    double pathVc = 0;
-    int events = 1;                    ///< scattering events of its subpath, with this one
-    const Material* medium = nullptr;  ///< that absorbs on the side of `back`,
-    const Material* beyond = nullptr;  ///< and on the other
-
-    const Vec3& position() const { return side.point.position; }
-    float cosine(const Vec3& direction) const { return std::abs(dot(side.point.geometricNormal, direction)); }
-    /// As seen from elsewhere.
-    Side from(const Scene& scene, const Vec3& viewer) const {
-        return {scene, seenFrom(side.point, viewer), surface, viewer};
-    }
-    /// Light that arrives from `direction` at a distance, of what starts there.
-    Rgb arriving(const Vec3& direction, float distance) const {
-        const Material* through = dot(side.point.geometricNormal, direction) < 0 ? beyond : medium;
-        return through != nullptr ? transmitted(through->absorption, distance) : Rgb(1);
-    }
-    /// Turns densities per solid angle at the vertex before into densities per area here.
-    void arriveAt(double distanceSquared) {
-        const double cosHere = mis(std::max(cosine(back), 1e-9f));
-        vcm *= mis(distanceSquared) / cosHere;
-        vc /= cosHere;
-        pathVc /= cosHere;
-    }
+struct BidirectionalTracer::LightVertex {
+    PathVertex<kEveryFeature, SurfacePoint> at;
+    MisSums sums;
+    Rgb throughput;  ///< divided by the cosine with `at.back`
+    int events = 1;  ///< scattering events of its subpath, with this one
 };
 
 }  // namespace vlx::render

@@ -2,7 +2,7 @@
 
 namespace vlx::render {
 
-template PathSample PathTracer::traceWith<kLayeredTextured>(Ray, const PathSampler&) const;
-template PathSample PathTracer::traceWith<kEveryFeature>(Ray, const PathSampler&) const;
+template PathSample tracePath<kLayeredTextured>(const PathContext&, const Ray&, const PathSampler&);
+template PathSample tracePath<kEveryFeature>(const PathContext&, const Ray&, const PathSampler&);
 
 }  // namespace vlx::render

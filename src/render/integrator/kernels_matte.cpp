@@ -2,8 +2,8 @@
 
 namespace vlx::render {
 
-template PathSample PathTracer::traceWith<kMatte>(Ray, const PathSampler&) const;
-template PathSample PathTracer::traceWith<kMatteTextured>(Ray, const PathSampler&) const;
-template PathSample PathTracer::traceWith<kReflecting>(Ray, const PathSampler&) const;
+template PathSample tracePath<kMatte>(const PathContext&, const Ray&, const PathSampler&);
+template PathSample tracePath<kMatteTextured>(const PathContext&, const Ray&, const PathSampler&);
+template PathSample tracePath<kReflecting>(const PathContext&, const Ray&, const PathSampler&);
 
 }  // namespace vlx::render

@@ -2,7 +2,7 @@
 
 namespace vlx::render {
 
-template PathSample PathTracer::traceWith<kReflectingTextured>(Ray, const PathSampler&) const;
-template PathSample PathTracer::traceWith<kLayered>(Ray, const PathSampler&) const;
+template PathSample tracePath<kReflectingTextured>(const PathContext&, const Ray&, const PathSampler&);
+template PathSample tracePath<kLayered>(const PathContext&, const Ray&, const PathSampler&);
 
 }  // namespace vlx::render

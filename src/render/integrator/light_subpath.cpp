@@ -4,126 +4,119 @@
 namespace vlx::render {
 namespace {
 
+using LitVertex = PathVertex<kEveryFeature, SurfacePoint>;
+
 /// Part of the light that goes on behind a single-sided surface whose front it has met.
 constexpr float kBehind = 0.0625f;
 
+/// Whether light goes on behind a surface that cannot be seen from behind: by a number of the ray's.
+bool goesBehind(std::uint32_t seed, std::uint32_t ray) {
+    return unitFloat(static_cast<std::uint32_t>(hashOf(seed, ray, 0x626568u))) < kBehind;
+}
+
+bool isDelta(const Light& light) {
+    return light.type == LightType::Point || light.type == LightType::Spot ||
+           light.type == LightType::Directional;
+}
+
+/// What becomes of light at a vertex: the factor of its throughput. `sums` go on with it.
+Rgb scatteredLight(const Scene& scene, const LitVertex& vertex, const BsdfSample& next, const Vec3& direction,
+                   MisSums& sums) {
+    const Side seen = vertex.from(scene, direction);
+    Rgb scattered;
+    double reverse = 0;
+    if (next.delta) {
+        scattered = next.weight;
+        if (!next.coat) scattered *= seen.bsdf.beneath() / vertex.side.bsdf.beneath();
+        // Light is squeezed into a smaller solid angle where importance, carried as L / n^2, is not.
+        if (next.through) {
+            const float ior = vertex.point.fromBehind ? 1 / vertex.surface.ior : vertex.surface.ior;
+            scattered *= std::abs(vertex.side.wo.z / next.wi.z) / (ior * ior);
+        }
+    } else {
+        const BsdfValue f = seen.evaluate(vertex.back);
+        scattered = f.value / next.pdf;
+        reverse = f.pdf;
+    }
+    sums.scatter(next, vertex.cosine(direction), reverse);
+    return scattered * (vertex.cosine(direction) / vertex.cosine(vertex.back));
+}
+
+/// At the first vertex, at a distance from the light.
+MisSums sumsAtFirst(const PathContext& in, const LitVertex& vertex, const Emission& start, float distance) {
+    double direct = 0;
+    if (vertex.side.bsdf.hasSmoothLobe()) {
+        LightSampler::Local local;
+        in.lights.prepare(local, receiverAt(vertex.point));
+        direct = in.lights.density(local, start.light, start.triangle, vertex.back, distance, start.cosLight);
+    }
+    const double emitted = start.density * vertex.cosine(vertex.back);
+    MisSums sums;
+    sums.vcm = sums.pathVcm = mis(direct / emitted);
+    sums.vc = sums.pathVc = isDelta(in.scene.lights[start.light]) ? 0 : mis(1 / emitted);
+    return sums;
+}
+
 }  // namespace
 
-std::vector<BidirectionalTracer::Vertex> BidirectionalTracer::lightSubpath(const PathSampler& sampler,
-                                                                           float time) const {
-    std::vector<Vertex> path;
-    if (emitter_.empty() || options_.maxBounces < 1) return path;
+std::vector<BidirectionalTracer::LightVertex> BidirectionalTracer::lightSubpath(const PathSampler& sampler,
+                                                                                float time) const {
+    std::vector<LightVertex> path;
+    if (emitter_.empty() || context_.options.maxBounces < 1) return path;
     const Emission start =
         emitter_.sample(sampler.pair(dimension::kEmission).x, sampler.pair(dimension::kEmissionOrigin),
                         sampler.pair(dimension::kEmissionDirection), time);
     if (isBlack(start.throughput)) return path;
-    const Light& light = scene_.lights[start.light];
-    const bool delta = light.type == LightType::Point || light.type == LightType::Spot ||
-                       light.type == LightType::Directional;
+    const Light& light = context_.scene.lights[start.light];
     const std::uint32_t seed = sampler.hashSeed(dimension::kLightOpacity);
     std::uint32_t rays = 0;
-    Ray ray = start.ray;
-    Rgb throughput = start.throughput;
-    double vcm = 0, vc = 0, pathVc = 0, way = 0;
-    const Material* medium = nullptr;
+    GeneralWalk walk{context_, start.ray, start.throughput};
+    MisSums sums;
     path.reserve(6);
 
-    for (int events = 1;;) {
-        const std::optional<Hit> hit = accelerator_.intersectBothSides(ray, seed + rays++);
+    for (;;) {
+        const std::optional<Hit> hit = context_.accelerator.intersectBothSides(walk.ray, seed + rays++);
         if (!hit || hit->light >= 0) break;
-        const SurfacePoint point = surfacePoint<kEveryFeature>(scene_, *hit, ray.direction, time);
-        const Material& material = *point.material;
-        way += hit->distance;
-        if (medium == nullptr && point.fromBehind && absorbs_ && material.absorbs()) medium = &material;
-        if (medium != nullptr) throughput *= transmitted(medium->absorption, hit->distance);
-        if (!material.visibleFromBehind()) {
+        const SurfacePoint point = walk.arrive(*hit);
+        if (!point.material->visibleFromBehind()) {
             // Seen from behind by light, from the front by the camera's rays, and the other way round.
             if (point.fromBehind) break;
-            const bool behind =
-                unitFloat(static_cast<std::uint32_t>(hashOf(seed, rays, 0x626568u))) < kBehind;
-            throughput *= 1 / (behind ? kBehind : 1 - kBehind);
+            const bool behind = goesBehind(seed, rays);
+            walk.throughput *= 1 / (behind ? kBehind : 1 - kBehind);
             if (behind) {
-                ray = leave(point, ray.direction, time);
+                walk.pass(point);
                 continue;
             }
         }
-        SurfaceParameters surface = parametersAt<kEveryFeature>(scene_, point);
-        surface.leftOut = options_.leftOut;
-        Vertex vertex{Side(scene_, point, surface, -ray.direction), surface, -ray.direction, throughput};
-        vertex.events = events;
-        vertex.medium = medium;
-        if (absorbs_ && material.absorbs() && !point.fromBehind) vertex.beyond = &material;
+        const LitVertex vertex(walk, point);
         const float cosBack = vertex.cosine(vertex.back);
         if (!(cosBack > 0)) break;
-        if (events == 1) {
-            const auto distance = static_cast<float>(way);
-            throughput *= light.type == LightType::Sphere ? 1.f : light.window(distance * distance);
-            if (isBlack(throughput)) break;
-            LightSampler::Local local;
-            double direct = 0;
-            if (vertex.side.bsdf.hasSmoothLobe()) {
-                lights_.prepare(local, receiverAt(point));
-                direct =
-                    directDensity(local, start.light, start.triangle, vertex.back, distance, start.cosLight);
-            }
-            vertex.vcm = mis(direct / (start.density * cosBack));
-            vertex.vc = delta ? 0 : mis(1 / (start.density * cosBack));
-            vertex.pathVcm = vertex.vcm;
-            vertex.pathVc = vertex.vc;
+        if (walk.bounces == 0) {
+            const auto distance = static_cast<float>(walk.way);
+            walk.throughput *= light.type == LightType::Sphere ? 1.f : light.window(distance * distance);
+            if (isBlack(walk.throughput)) break;
+            sums = sumsAtFirst(context_, vertex, start, distance);
         } else {
-            vertex.vcm = vcm;
-            vertex.vc = vc;
-            vertex.pathVc = pathVc;
-            vertex.arriveAt(way * way);
+            sums.arrive(walk.way * walk.way, cosBack);
         }
-        vertex.throughput = throughput / cosBack;
-        path.push_back(vertex);
-        if (events >= options_.maxBounces) break;
+        const int events = walk.bounces + 1;
+        path.push_back({vertex, sums, walk.throughput / cosBack, events});
+        if (events >= context_.options.maxBounces) break;
 
-        const Vec2 choice = sampler.pair(dimension::kFirstLightBounce +
-                                         dimension::kPerLightBounce * static_cast<std::uint32_t>(events) +
-                                         dimension::kChoice);
-        const Vec2 u = sampler.pair(dimension::kFirstLightBounce +
-                                    dimension::kPerLightBounce * static_cast<std::uint32_t>(events) +
-                                    dimension::kDirection);
-        const BsdfSample next = vertex.side.bsdf.sample(u, choice.x);
+        const std::uint32_t pair =
+            dimension::kFirstLightBounce + dimension::kPerLightBounce * static_cast<std::uint32_t>(events);
+        const Vec2 choice = sampler.pair(pair + dimension::kChoice);
+        const BsdfSample next = vertex.side.bsdf.sample(sampler.pair(pair + dimension::kDirection), choice.x);
         if (next.delta ? isBlack(next.weight) : !(next.pdf > 0)) break;
-        if (delta && events == 1 && next.delta) break;  // what no path of PathTracer's finds
-        if (next.folded) break;                         // nor this
+        if (isDelta(light) && events == 1 && next.delta) break;  // what no path of PathTracer's finds
+        if (next.folded) break;                                  // nor this
         const Vec3 direction = normalized(vertex.side.frame.toWorld(next.wi));
-        const Side seen = vertex.from(scene_, direction);
-        Rgb scattered;
-        if (next.delta) {
-            scattered = next.weight;
-            if (!next.coat) scattered *= seen.bsdf.beneath() / vertex.side.bsdf.beneath();
-            // Light is squeezed into a smaller solid angle where importance, carried as L / n^2, is not.
-            if (next.through) {
-                const float ior = point.fromBehind ? 1 / surface.ior : surface.ior;
-                scattered *= std::abs(vertex.side.wo.z / next.wi.z) / (ior * ior);
-            }
-            vcm = 0;
-            vc = vertex.vc * mis(vertex.cosine(direction));
-            pathVc = vertex.pathVc * mis(vertex.cosine(direction));
-        } else {
-            const BsdfValue f = seen.evaluate(vertex.back);
-            scattered = f.value / next.pdf;
-            const double turned = mis(vertex.cosine(direction) / static_cast<double>(next.pdf));
-            vc = turned * (vertex.vc * mis(f.pdf) + vertex.vcm);
-            pathVc = turned * (vertex.pathVc * mis(f.pdf) + vertex.pathVcm);
-            vcm = mis(1 / static_cast<double>(next.pdf));
-        }
-        scattered *= vertex.cosine(direction) / cosBack;
-        const float survival = std::min(1.f, maxComponent(throughput * scattered) / maxComponent(throughput));
-        throughput *= scattered;
-        if (!(maxComponent(throughput) > 0)) break;
-        if (events > kSureBounces) {
-            if (choice.y >= survival) break;
-            throughput *= 1 / survival;
-        }
-        if (next.through) medium = vertex.beyond;
-        ray = leave(point, direction, time);
-        way = 0;
-        ++events;
+        const Rgb scattered = scatteredLight(context_.scene, vertex, next, direction, sums);
+        const float survival =
+            std::min(1.f, maxComponent(walk.throughput * scattered) / maxComponent(walk.throughput));
+        walk.throughput *= scattered;
+        if (!(maxComponent(walk.throughput) > 0)) break;
+        if (!walk.goOn(vertex, next, direction, survival, choice.y)) break;
     }
     return path;
 }

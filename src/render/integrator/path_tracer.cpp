@@ -26,24 +26,17 @@ bool covers(const Features& kernel, const Features& wanted) {
 
 }  // namespace
 
-PathTracer::PathTracer(const Scene& scene, const Accelerator& accelerator, const PathOptions& options)
-    : scene_(scene),
-      accelerator_(accelerator),
-      options_(options),
-      lights_(scene, options.effects == EffectSet::all()),
-      features_(kEveryFeature),
-      kernel_(&PathTracer::traceWith<kEveryFeature>),
-      hashesOpacity_(options.effects.has(Effect::Alpha)),
-      choosesLights_(lights_.size() > 1 || options.effects == EffectSet::all()),
-      absorbs_(options.effects.has(Effect::Absorption)),
-      dropsCaustics_(options.leftOut.has(Effect::Caustics)) {
-    if (!options.effects.has(Effect::Indirect)) options_.maxBounces = std::min(1, options.maxBounces);
+PathTracer::PathTracer(const Scene& scene, const Accelerator& accelerator, const View& view,
+                       const PathOptions& options)
+    : Integrator(view, options.effects),
+      context_(scene, accelerator, options, options.effects == EffectSet::all()),
+      kernel_(&tracePath<kEveryFeature>) {
     const Features wanted = featuresFor(options.effects, options.leftOut, scene);
     // Smallest first. One with everything but the rare parts serves what none of the smaller ones does.
     const auto offer = [&]<Features F>() {
         if (features_ != kEveryFeature || !covers(F, wanted)) return;
         features_ = F;
-        kernel_ = &PathTracer::traceWith<F>;
+        kernel_ = &tracePath<F>;
     };
     offer.operator()<kMatte>();
     offer.operator()<kMatteTextured>();

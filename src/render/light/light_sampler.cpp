@@ -10,7 +10,7 @@ LightSampler::LightSampler(const Scene& scene, bool measures)
         meshes_.emplace_back();
         if (light.type == LightType::Mesh) addTriangles(light);
         if (light.type == LightType::Environment)
-            environmentLight_ = static_cast<std::int64_t>(candidates_.size()) - 1;
+            environmentLight_ = static_cast<std::int32_t>(candidates_.size()) - 1;
     }
     if (candidates_.size() > kLocalLights) {
         tree_ = LightTree(candidates_);
@@ -150,6 +150,24 @@ LightSample LightSampler::sampleAny(const Local& local, float choice, Vec2 u) co
     return s;
 }
 
+double LightSampler::density(const Local& local, std::uint32_t light, std::uint32_t triangle,
+                             const Vec3& direction, float distance, float cosLight) const {
+    switch (scene_->lights[light].type) {
+        case LightType::Mesh:
+            return meshPdf(local, light, triangle, distance, cosLight);
+        case LightType::Sphere:
+            return spherePdf(local, light);
+        case LightType::Environment:
+            return environmentPdf(local, direction);
+        case LightType::Directional:
+            return probability(local, light);
+        case LightType::Point:
+        case LightType::Spot:
+            return probability(local, light) * static_cast<double>(distance) * distance;
+    }
+    return 0;
+}
+
 float LightSampler::meshPdf(const Local& local, std::uint32_t light, std::uint32_t triangle, float distance,
                             float cosLight) const {
     return probability(local, light) * triangles_[meshes_[light].firstTriangle + triangle].density *
@@ -166,7 +184,6 @@ float LightSampler::spherePdf(const Local& local, std::uint32_t light) const {
 }
 
 float LightSampler::environmentPdf(const Local& local, const Vec3& direction) const {
-    if (environmentLight_ < 0) return 0;
     return probability(local, static_cast<std::size_t>(environmentLight_)) *
            scene_->environment.pdf(direction, local.receiver.normal, local.receiver.bothSides);
 }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include "render/light/light.h"
@@ -65,19 +64,13 @@ class LightSampler {
         if (alone_ && meshes_[0].light != nullptr) return sampleMesh(local.receiver, 0, u);
         return sampleAny(local, choice, u);
     }
-    /// Density with which sample() would have chosen the direction from the receiver to a point of triangle
-    /// `triangle` (of its shape) of mesh light `light`, at `distance`, the light's cosine being `cosLight`.
-    float meshPdf(const Local& local, std::uint32_t light, std::uint32_t triangle, float distance,
-                  float cosLight) const;
-    float spherePdf(const Local& local, std::uint32_t light) const;
-    float environmentPdf(const Local& local, const Vec3& direction) const;
-    /// The environment's number among the scene's lights, when it is one.
-    std::optional<std::size_t> environment() const {
-        if (environmentLight_ < 0) return std::nullopt;
-        return static_cast<std::size_t>(environmentLight_);
-    }
-    /// Probability with which sample() would have chosen a light.
-    float probability(const Local& local, std::size_t light) const;
+    /// Density with which sample() at a receiver would have chosen a light that is met in `direction` from
+    /// it: per solid angle; of points and spots per area; of directional lights the choice only. `triangle`:
+    /// of a mesh light's shape, at `distance`, the light's cosine being `cosLight`.
+    double density(const Local& local, std::uint32_t light, std::uint32_t triangle, const Vec3& direction,
+                   float distance, float cosLight) const;
+    /// The environment's number among the scene's lights, or -1 when it is none.
+    std::int32_t environment() const { return environmentLight_; }
 
   private:
     /// A triangle of a mesh light.
@@ -101,6 +94,12 @@ class LightSampler {
     void estimate(Local& local) const;
     void addTriangles(const Light& light);
     Choice choose(const Local& local, float u) const;
+    /// Probability with which sample() would have chosen a light.
+    float probability(const Local& local, std::size_t light) const;
+    float meshPdf(const Local& local, std::uint32_t light, std::uint32_t triangle, float distance,
+                  float cosLight) const;
+    float spherePdf(const Local& local, std::uint32_t light) const;
+    float environmentPdf(const Local& local, const Vec3& direction) const;
 
     LightSample sampleAny(const Local& local, float choice, Vec2 u) const;
     LightSample sampleMesh(const Receiver& receiver, std::size_t light, Vec2 u) const;
@@ -112,7 +111,7 @@ class LightSampler {
     std::vector<MeshLight> meshes_;  ///< one for each light
     std::vector<LightQuad> quads_;   ///< when there are at most kLocalLights
     LightTree tree_;                 ///< when there are more than kLocalLights
-    std::int64_t environmentLight_ = -1;
+    std::int32_t environmentLight_ = -1;
     bool measures_;
     bool alone_;  ///< a single light, taken without estimates
 };

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 
-#include "render/integrator/bidirectional.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/text.h"
 
@@ -63,27 +62,17 @@ class Pilots {
     Pilot path(int maxBounces, int rounds) const {
         PathOptions path = options_.path;
         path.maxBounces = std::min(path.maxBounces, maxBounces);
-        const PathTracer tracer(scene_, accelerator_, path);
-        return run(rounds, [&](float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                               std::vector<Splat>&,
-                               Rgb&) { return tracer.trace(view_.ray(x, y, lens, time), sampler).radiance; });
+        return run(IntegratorKind::Path, path, rounds);
     }
 
-    Pilot bidirectional() const {
-        const BidirectionalTracer tracer(scene_, accelerator_, view_, picture_.window, options_.path);
-        return run(kRounds, [&](float x, float y, Vec2 lens, float time, const PathSampler& sampler,
-                                std::vector<Splat>& splats, Rgb& squares) {
-            return tracer.trace(x, y, lens, time, sampler, splats, &squares).radiance;
-        });
-    }
+    Pilot bidirectional() const { return run(IntegratorKind::Bidirectional, options_.path, kRounds); }
 
   private:
-    template <class Trace>
-    Pilot run(int rounds, Trace trace) const {
+    Pilot run(IntegratorKind kind, const PathOptions& path, int rounds) const {
         const Window& window = picture_.window;
+        const std::unique_ptr<Integrator> integrator =
+            makeIntegrator(kind, scene_, accelerator_, view_, window, path);
         const auto pixels = static_cast<std::size_t>(window.pixels());
-        const bool lens = options_.path.effects.has(Effect::DepthOfField);
-        const bool moves = options_.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion});
         Pilot pilot;
         pilot.pathSquares.assign(3 * pixels, 0.0);
         std::vector<Splat> splats;
@@ -101,15 +90,10 @@ class Pilots {
             };
             for (int row = window.y; row < window.y + window.height; ++row)
                 for (int column = window.x; column < window.x + window.width; ++column) {
-                    const PathSampler sampler(hashOf(options_.seed, 0x696e74u, round, column, row), 0);
-                    const Vec2 at = sampler.pair(dimension::kPixel);
-                    const Vec2 u = lens ? sampler.pair(dimension::kLens) : Vec2{};
-                    const float time = moves ? sampler.pair(dimension::kTime).x : 0;
+                    const CameraSample sample =
+                        sampleInPixel(column, row, hashOf(options_.seed, 0x696e74u, round, column, row), 0);
                     Rgb squares;
-                    add(sums, column, row,
-                        trace(static_cast<float>(column) + at.x, static_cast<float>(row) + at.y, u, time,
-                              sampler, splats, squares),
-                        1);
+                    add(sums, column, row, integrator->trace(sample, splats, &squares).radiance, 1);
                     add(pilot.pathSquares, column, row, squares, 1.0 / kRounds);
                     for (const Splat& s : splats) {
                         const Rgb v = s.radiance / static_cast<float>(pixels);
@@ -170,15 +154,15 @@ struct Errors {
 IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& accelerator,
                                   const RenderOptions& options, double samples) {
     RenderOptions other = options;
-    other.integrator = Integrator::Bidirectional;
+    other.integrator = IntegratorKind::Bidirectional;
     other.band = {};  // as for the whole picture, which bands must agree with
-    if (const auto fault = other.validate(scene)) return {Integrator::Path, *fault, false};
-    if (scene.lights.empty()) return {Integrator::Path, "there are no lights to start from", false};
+    if (const auto fault = other.validate(scene)) return {IntegratorKind::Path, *fault, false};
+    if (scene.lights.empty()) return {IntegratorKind::Path, "there are no lights to start from", false};
     const EffectSet& called = options.plan->called;
     if (!called.has(Effect::Indirect) || !options.path.effects.has(Effect::Indirect) ||
         options.path.maxBounces < 2)
-        return {Integrator::Path, "light scatters once at most", false};
-    if (samples < kLeastSamples) return {Integrator::Path, "too few samples for a pilot to pay", false};
+        return {IntegratorKind::Path, "light scatters once at most", false};
+    if (samples < kLeastSamples) return {IntegratorKind::Path, "too few samples for a pilot to pay", false};
 
     const Pilots pilots(scene, accelerator, options);
     std::string why = "caustics";
@@ -188,7 +172,7 @@ IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& acceler
         const double straight = pilots.path(1, kFew).sum();
         const double share = all > 0 ? straight / all : 1;
         if (share >= 0.25)
-            return {Integrator::Path,
+            return {IntegratorKind::Path,
                     "no caustics, and " + formatted("%.0f", 100 * share) + " % of the light comes straight",
                     false};
         why = "only " + formatted("%.0f", 100 * share) + " % of the light comes straight";
@@ -200,7 +184,7 @@ IntegratorChoice chooseIntegrator(const Scene& scene, const Accelerator& acceler
     const double bothCost = errors.both * both.rays * kRayCost;
     const bool better = bothCost * kMargin < pathCost;
     const double ratio = bothCost > 0 ? pathCost / bothCost : 1;
-    return {better ? Integrator::Bidirectional : Integrator::Path,
+    return {better ? IntegratorKind::Bidirectional : IntegratorKind::Path,
             why + "; in a pilot bidirectional tracing was " + formatted("%.2g", ratio) +
                 " times as fast to an error",
             true};

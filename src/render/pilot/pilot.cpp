@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "render/integrator/bidirectional.h"
+#include "render/integrator/integrator.h"
 #include "render/scene/camera.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
@@ -50,8 +50,9 @@ struct Variant {
                 accelerator = ownAccelerator.get();
             }
         }
-        view = std::make_unique<View>(traced->cameras[options.camera], options.width, options.height);
-        tracer = std::make_unique<PathTracer>(*traced, *accelerator, path);
+        integrator = makeIntegrator(IntegratorKind::Path, *traced, *accelerator,
+                                    View(traced->cameras[options.camera], options.width, options.height),
+                                    {0, 0, options.width, options.height}, path);
     }
 
     /// Whether the shared accelerator does not fit: it knows lights by number.
@@ -65,8 +66,7 @@ struct Variant {
     }
 
     double run(const RenderOptions& options) const {
-        const bool lens = path.effects.has(Effect::DepthOfField);
-        const bool moves = path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion});
+        std::vector<Splat> splats;
         const double start = threadSeconds();
         for (int i = 0; i < kSide * kSide; ++i) {
             const float x =
@@ -74,10 +74,12 @@ struct Variant {
             const float y =
                 (static_cast<float>(i / kSide) + 0.5f) / kSide * static_cast<float>(options.height);
             for (std::uint32_t s = 0; s < kSamples; ++s) {
-                const PathSampler sampler(hashOf(options.seed, i), s);
-                const Vec2 u = lens ? sampler.pair(dimension::kLens) : Vec2{};
-                const float time = moves ? sampler.pair(dimension::kTime).x : 0;
-                tracer->trace(view->ray(x, y, u, time), sampler);
+                CameraSample sample;
+                sample.x = x;
+                sample.y = y;
+                sample.seed = hashOf(options.seed, i);
+                sample.index = s;
+                integrator->trace(sample, splats);
             }
         }
         return threadSeconds() - start;
@@ -86,8 +88,7 @@ struct Variant {
     PathOptions path;
     std::unique_ptr<Scene> own;
     std::unique_ptr<Accelerator> ownAccelerator;
-    std::unique_ptr<View> view;
-    std::unique_ptr<PathTracer> tracer;
+    std::unique_ptr<Integrator> integrator;
 };
 
 }  // namespace
@@ -117,13 +118,9 @@ PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, co
     using Clock = std::chrono::steady_clock;
     constexpr int kPixels = 1024, kPerPixel = 16, kMostRounds = 64;
     const View view(scene.cameras[options.camera], options.width, options.height);
-    const PathTracer tracer(scene, accelerator, options.path);
-    const bool lens = options.path.effects.has(Effect::DepthOfField);
-    const bool moves = options.path.effects.hasAny({Effect::CameraMotion, Effect::ObjectMotion});
     const Window window = options.crop.value_or(Window{0, 0, options.width, options.height});
-    std::optional<BidirectionalTracer> both;
-    if (options.integrator == Integrator::Bidirectional)
-        both.emplace(scene, accelerator, view, window, options.path);
+    const std::unique_ptr<Integrator> integrator =
+        makeIntegrator(options.integrator, scene, accelerator, view, window, options.path);
     PilotMeasure measure;
     double variance = 0;
     int rounds = 0;
@@ -134,20 +131,13 @@ PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, co
             // Points of the plane's sequence, mixed, so that a round's pixels are all over the picture.
             const SobolPoint p = scrambledSobolPoint(static_cast<std::uint32_t>(rounds * kPixels + i),
                                                      SobolSeeds::from(0x70696cu));
-            const float x =
-                static_cast<float>(window.x) + std::floor(unitFloat(p.x) * static_cast<float>(window.width));
-            const float y =
-                static_cast<float>(window.y) + std::floor(unitFloat(p.y) * static_cast<float>(window.height));
+            const int column = window.x + static_cast<int>(unitFloat(p.x) * static_cast<float>(window.width));
+            const int row = window.y + static_cast<int>(unitFloat(p.y) * static_cast<float>(window.height));
             std::array<double, 3> sum{}, squares{};
             std::vector<Splat> splats;
             for (std::uint32_t s = 0; s < kPerPixel; ++s) {
-                const PathSampler sampler(hashOf(options.seed, 0x70696cu, rounds, i), s);
-                const Vec2 at = sampler.pair(dimension::kPixel);
-                const Vec2 u = lens ? sampler.pair(dimension::kLens) : Vec2{};
-                const float time = moves ? sampler.pair(dimension::kTime).x : 0;
-                const PathSample sample = both ? both->trace(x + at.x, y + at.y, u, time, sampler, splats)
-                                               : tracer.trace(view.ray(x + at.x, y + at.y, u, time), sampler);
-                const Rgb& v = sample.radiance;
+                const std::uint64_t seed = hashOf(options.seed, 0x70696cu, rounds, i);
+                const Rgb v = integrator->trace(sampleInPixel(column, row, seed, s), splats).radiance;
                 const std::array<double, 3> rgb{v.x, v.y, v.z};
                 for (std::size_t c = 0; c < 3; ++c) {
                     sum[c] += rgb[c];

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,17 @@ struct Camera {
     float focusDistance = 0;   ///< along the axis; used when lensRadius > 0
     bool preferred = false;    ///< marked as the one to use (extras `active`)
     std::string unusable;      ///< why it cannot be rendered from (orthographic, ...); empty when it can
+};
+
+/// One sample to take: a position on the image plane, and which numbers the path uses.
+struct CameraSample {
+    int column = 0;  ///< its pixel
+    int row = 0;
+    float x = 0;  ///< raster position inside the pixel
+    float y = 0;
+    std::uint64_t seed = 0;       ///< of the pixel's (replicate's) randomisation
+    std::uint32_t index = 0;      ///< among the pixel's (replicate's) samples
+    std::uint32_t replicate = 0;  ///< independent randomisation it belongs to
 };
 
 /// A camera with an image size: rays through raster positions (x right, y down, pixel (i, j) covers

@@ -1,0 +1,138 @@
+#pragma once
+
+#include "render/integrator/path_context.h"
+#include "render/surface/bsdf.h"
+#include "render/surface/surface.h"
+
+/// What every subpath, from the camera or from a light, does from one vertex to the next; compiled for what
+/// a scene calls for.
+namespace vlx::render {
+
+/// Bounces before roulette may end a path.
+inline constexpr int kSureBounces = 2;
+
+/// A ray that leaves a surface, its origin moved off the surface by more than rounding can err.
+inline Ray leave(const SurfacePoint& point, const Vec3& direction, float time) {
+    const float scale = 4e-6f * maxComponent(absolute(point.position)) + 1e-9f;
+    const float side = dot(direction, point.geometricNormal) >= 0 ? scale : -scale;
+    return {point.position + point.geometricNormal * side, direction, time};
+}
+
+/// Part of light that is left after a distance in a medium.
+inline Rgb transmitted(const Rgb& absorption, float distance) {
+    countEffect(Effect::Absorption);
+    const auto kept = [&](float a) { return a > 0 ? std::exp(-a * distance) : 1.f; };
+    return {kept(absorption.x), kept(absorption.y), kept(absorption.z)};
+}
+
+/// A surface as seen from one direction.
+template <Features F>
+struct Side {
+    Side(const Scene& scene, const SurfacePoint& seen, const SurfaceParameters& surface, const Vec3& viewer)
+        : frame(seen.shadingNormal),
+          wo(frame.toLocal(viewer)),
+          bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, seen.fromBehind, scene.albedoTables[0],
+               frame.toLocal(seen.geometricNormal)) {}
+
+    BsdfValue evaluate(const Vec3& direction) const { return bsdf.evaluate(frame.toLocal(direction)); }
+
+    Frame frame;
+    Vec3 wo;
+    BasicBsdf<F> bsdf;
+};
+
+template <Features F>
+struct Walk;
+
+/// Where a subpath scatters. `Point`: SurfacePoint, or a reference to one that outlives the vertex.
+template <Features F, class Point = const SurfacePoint&>
+struct PathVertex {
+    PathVertex(const Walk<F>& walk, const SurfacePoint& met)
+        : point(met),
+          surface(walk.parameters(point)),
+          back(-walk.ray.direction),
+          side(walk.in.scene, point, surface, back) {
+        if constexpr (F.rare) {
+            medium = walk.medium;
+            if (!point.fromBehind && walk.absorbs(*point.material)) beyond = point.material;
+        }
+    }
+
+    Point point;  ///< as seen from the vertex before
+    SurfaceParameters surface;
+    Vec3 back;                         ///< unit, to the vertex before
+    const Material* medium = nullptr;  ///< that absorbs on the side of `back`,
+    const Material* beyond = nullptr;  ///< and on the other
+    Side<F> side;                      ///< that is seen from the vertex before
+
+    float cosine(const Vec3& direction) const { return std::abs(dot(point.geometricNormal, direction)); }
+    /// As seen from elsewhere.
+    Side<F> from(const Scene& scene, const Vec3& viewer) const {
+        return {scene, seenFrom(point, viewer), surface, viewer};
+    }
+    /// Part that arrives of light that starts at a distance in `direction`.
+    Rgb arriving(const Vec3& direction, float distance) const {
+        if constexpr (F.rare) {
+            const Material* through = dot(point.geometricNormal, direction) < 0 ? beyond : medium;
+            if (through != nullptr) return transmitted(through->absorption, distance);
+        }
+        return Rgb(1);
+    }
+};
+
+/// A subpath on its way.
+template <Features F>
+struct Walk {
+    const PathContext& in;
+    Ray ray;  ///< that it goes on by
+    Rgb throughput{1, 1, 1};
+    const Material* medium = nullptr;  ///< that the ray travels in, where it absorbs
+    int bounces = 0;                   ///< scattering events so far
+    double way = 0;                    ///< from the last of them, or the start, to the surface that was met
+
+    bool absorbs(const Material& material) const { return F.rare && in.absorbs && material.absorbs(); }
+
+    /// Goes `distance` along the ray.
+    void travel(float distance) {
+        way += distance;
+        if constexpr (F.rare)
+            if (medium != nullptr) throughput *= transmitted(medium->absorption, distance);
+    }
+
+    /// Goes to the surface that the ray has met.
+    SurfacePoint arrive(const Hit& hit) {
+        const SurfacePoint point = surfacePoint<F>(in.scene, hit, ray.direction, ray.time);
+        // A ray that starts inside learns so when it meets the solid's surface from behind.
+        if (medium == nullptr && point.fromBehind && absorbs(*point.material)) medium = point.material;
+        travel(hit.distance);
+        return point;
+    }
+
+    SurfaceParameters parameters(const SurfacePoint& point) const {
+        SurfaceParameters surface = parametersAt<F>(in.scene, point);
+        if constexpr (F.rare) surface.leftOut = in.options.leftOut;
+        return surface;
+    }
+
+    /// Goes on behind the surface as if it were not there.
+    void pass(const SurfacePoint& point) { ray = leave(point, ray.direction, ray.time); }
+
+    /// Goes on from a vertex, which has scattered; roulette lets the path live with probability `survival`,
+    /// decided by `u`. Returns whether it lives.
+    template <class Point>
+    bool goOn(const PathVertex<F, Point>& vertex, const BsdfSample& scattered, const Vec3& direction,
+              float survival, float u) {
+        if (bounces >= kSureBounces) {
+            if (u >= survival) return false;
+            throughput *= 1 / survival;
+        }
+        if constexpr (F.rare)
+            if (scattered.through) medium = vertex.beyond;
+        ray = leave(vertex.point, direction, ray.time);
+        ++bounces;
+        way = 0;
+        return true;
+    }
+};
+
+}  // namespace vlx::render
