@@ -210,7 +210,7 @@ TEST(VlxCompareSweep, WithoutMethodsOnlySamples) {
     const ToolRun run = sweep({kScene, "-o", out, "--width", "16", "--height", "12", "--spp", "2,4",
                                "--seeds", "1", "--methods", "none", "--json", "-q"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
-    EXPECT_EQ(run.out, contents(out + "/results.jsonl"));
+    EXPECT_EQ(run.out, contentsOf(out + "/results.jsonl"));
     const auto all = records(out);
     ASSERT_EQ(all.size(), 2u);
     for (const auto& r : all) {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "../base/temporary_folder.h"
-#include "test_dumps.h"
+#include "../dump/test_dumps.h"
 
 namespace vlx {
 namespace {

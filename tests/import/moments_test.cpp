@@ -10,10 +10,10 @@
 #include <random>
 
 #include "../base/temporary_folder.h"
+#include "../dump/renderer_files.h"
+#include "../dump/test_dumps.h"
 #include "edit/info.h"
 #include "import/bcd.h"
-#include "renderer_files.h"
-#include "test_dumps.h"
 #include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 

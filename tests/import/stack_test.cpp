@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "../base/temporary_folder.h"
-#include "test_dumps.h"
+#include "../dump/test_dumps.h"
 #include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "../base/temporary_folder.h"
-#include "test_dumps.h"
+#include "../dump/test_dumps.h"
 #include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 

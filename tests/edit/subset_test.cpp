@@ -6,7 +6,7 @@
 #include <set>
 
 #include "../base/temporary_folder.h"
-#include "test_dumps.h"
+#include "../dump/test_dumps.h"
 #include "variolux/dump/reader.h"
 
 namespace vlx {

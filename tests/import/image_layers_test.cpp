@@ -5,11 +5,11 @@
 #include <gtest/gtest.h>
 
 #include "../base/temporary_folder.h"
+#include "../dump/layer_files.h"
+#include "../dump/renderer_files.h"
+#include "../dump/test_dumps.h"
 #include "exr/header_walker.h"
 #include "import/moments.h"
-#include "layer_files.h"
-#include "renderer_files.h"
-#include "test_dumps.h"
 #include "variolux/base/image_io.h"
 
 namespace vlx {

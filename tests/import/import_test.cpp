@@ -6,11 +6,11 @@
 #include <cstring>
 
 #include "../base/temporary_folder.h"
+#include "../dump/renderer_files.h"
+#include "../dump/test_dumps.h"
 #include "import/bcd.h"
 #include "import/sbmc.h"
 #include "import/stack.h"
-#include "renderer_files.h"
-#include "test_dumps.h"
 #include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 

@@ -1,0 +1,213 @@
+#include "reconstruct/drift/centre.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruct/drift/gram.h"
+#include "reconstruct/drift/wild_values.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr double kLeastFeatureSpread = 1e-8;  // squared: less is a constant
+constexpr double kLeastPositionSpread = 1e-12;
+constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
+constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this many: no datum, but a place
+// Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
+// than their prefilter says. Twice the standard deviation.
+constexpr double kFeatureErrorFactor = 4;
+constexpr float kLeastSquare = 1e-30f;  // of radiance, or of its noise
+constexpr int kPriorIterations = 4;
+
+int lanesUp(int n) { return (n + 7) & ~7; }
+
+}  // namespace
+
+void Centre::begin(const TilePlanes& tile, int at, int reach) {
+    tile_ = tile;
+    centre_ = static_cast<std::size_t>(at);
+    reach_ = reach;
+    stride_ = lanesUp((2 * reach + 1) * (2 * reach + 1));
+    const int most = 1 + kPositionFunctions + tile.featureCount + tile.radiance + kBlockRows;
+    rows_.resize(static_cast<std::size_t>(most * stride_));
+    index_.clear();
+    weights_.clear();
+    predicted_.clear();
+    noise_ = total_ = 0;
+}
+
+void Centre::add(int dx, int dy, float alike) {
+    const int at = static_cast<int>(centre_) + dy * kTileSide + dx;
+    const auto place = static_cast<std::size_t>(at);
+    const float own = std::max(1.f, tile_.counts[centre_]);
+    const float ratio = std::clamp(tile_.counts[place] / own, kLeastCountRatio, kMostCountRatio);
+    const bool datum = tile_.counts[place] > 0;
+    float* p = row(1) + index_.size();
+    index_.push_back(at);
+    weights_.push_back(datum ? alike * ratio : 0.f);
+    predicted_.push_back(alike * ratio);
+    const float perReach = 1.f / static_cast<float>(reach_);
+    const float px = static_cast<float>(dx) * perReach, py = static_cast<float>(dy) * perReach;
+    p[0] = px;
+    p[stride_] = py;
+    p[2 * stride_] = px * px;
+    p[3 * stride_] = py * py;
+    p[4 * stride_] = px * py;
+    if (!datum) return;
+    noise_ += static_cast<double>(alike * ratio) * tile_.errors[place] * ratio;
+    total_ += static_cast<double>(alike * ratio);
+}
+
+void Centre::krige(float* sums, NeighbourhoodCounts& counts) {
+    if (total_ <= 0) return;
+    ++counts.neighbourhoods;
+    weights_.resize(static_cast<std::size_t>(lanesUp(size())), 0.f);
+    stackFunctions();
+    stackRadiance();
+    weighted_.resize(rows_.size());
+    gram_.resize(static_cast<std::size_t>(gramRows_ * gramRows_));
+    weightedGram(rows_.data(), weights_.data(), gramRows_, stride_, lanesUp(size()), weighted_.data(),
+                 gram_.data());
+    const RandomDrift drift = fit();
+    counts.features += static_cast<std::int64_t>(varying_.size());
+    counts.failed += !drift.ok;
+    counts.effective += drift.effective;
+    predict(drift, sums);
+}
+
+/// The constant and the features about the centre's. Features that are constant here explain nothing: they
+/// have no row.
+void Centre::stackFunctions() {
+    const int n = size(), padded = lanesUp(n);
+    std::fill_n(row(0), n, 1.f);
+    varying_.clear();
+    for (int f = 0; f < tile_.featureCount; ++f) {
+        const float* values = tile_.features + TilePlanes::plane(f);
+        const float about = values[centre_];
+        float* x = row(1 + kPositionFunctions + static_cast<int>(varying_.size()));
+        for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - about;
+        std::fill(x + n, x + padded, 0.f);
+        if (forgetWild({x, weights_.data(), n, padded, total_}, kFarthest * kFeatureWidth2, sorted_) <
+            kLeastFeatureSpread)
+            continue;
+        const float* errors = tile_.features + TilePlanes::plane(FeaturePlanes{tile_.featureCount}.error(f));
+        double sum = 0;
+        for (int i = 0; i < n; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            sum += static_cast<double>(weights_[k] * errors[index_[k]]);
+        }
+        featureNoise_[varying_.size()] = sum;
+        varying_.push_back(f);
+    }
+    functions_ = kPositionFunctions + static_cast<int>(varying_.size());
+}
+
+/// Radiance about the centre's; the rest of the rows is 0.
+void Centre::stackRadiance() {
+    const int n = size(), used = 1 + functions_ + tile_.radiance;
+    gramRows_ = (used + kBlockRows - 1) / kBlockRows * kBlockRows;
+    for (int c = 0; c < tile_.radiance; ++c) {
+        const float* values = tile_.means + TilePlanes::plane(c);
+        float* x = row(1 + functions_ + c);
+        for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - values[centre_];
+    }
+    for (int r = 0; r < gramRows_; ++r) std::fill(row(r) + (r < used ? n : 0), row(r) + lanesUp(n), 0.f);
+}
+
+/// The normal equations about the weighted means, of functions that are standardised; constant ones are left
+/// out.
+RandomDrift Centre::fit() {
+    double spread = 0, level = 0;
+    for (int c = 0; c < 3; ++c) {
+        const int z = 1 + functions_ + c;
+        const double value = tile_.means[TilePlanes::plane(c) + centre_] + gram(z, 0) / total_;
+        spread += std::max(0.0, centred(z, z)) / total_ / 3;
+        level += value * value;
+    }
+    variance_ = std::max(noise_ / total_, 1e-10 * level + kLeastSquare);
+    used_.clear();
+    group_.clear();
+    for (int j = 0; j < functions_; ++j) {
+        const double square = centred(1 + j, 1 + j) / total_;
+        const int f = j - kPositionFunctions;  // which of varying_
+        if (!(square > (f < 0 ? kLeastPositionSpread : kLeastFeatureSpread))) continue;
+        unit_[used_.size()] = 1 / std::sqrt(square);
+        used_.push_back(1 + j);
+        group_.push_back(
+            f < 0 ? tile_.groups + (j >= 2)
+                  : (*tile_.group)[static_cast<std::size_t>(varying_[static_cast<std::size_t>(f)])]);
+    }
+    const auto p = static_cast<Eigen::Index>(used_.size());
+    DriftMoments moments;
+    moments.normal.resize(p, p);
+    moments.right.resize(p, tile_.radiance);
+    moments.fitted = 3;
+    moments.start = 1 / std::max(spread, variance_);
+    for (Eigen::Index a = 0; a < p; ++a) {
+        const auto i = static_cast<std::size_t>(a);
+        for (Eigen::Index b = 0; b <= a; ++b) {
+            const auto j = static_cast<std::size_t>(b);
+            moments.normal(a, b) = moments.normal(b, a) =
+                centred(used_[i], used_[j]) * unit_[i] * unit_[j] / variance_;
+        }
+        if (used_[i] > kPositionFunctions)
+            moments.normal(a, a) +=
+                kFeatureErrorFactor *
+                featureNoise_[static_cast<std::size_t>(used_[i] - 1 - kPositionFunctions)] * unit_[i] *
+                unit_[i] / variance_;
+        for (int c = 0; c < tile_.radiance; ++c)
+            moments.right(a, c) = centred(used_[i], 1 + functions_ + c) * unit_[i] / variance_;
+    }
+    return fitRandomDrift(moments, group_, tile_.groups + 2, kPriorIterations);
+}
+
+void Centre::predict(const RandomDrift& drift, float* sums) {
+    const EstimatePlanes out{tile_.radiance};
+    const int n = size(), padded = lanesUp(n);
+    // Towards its border a neighbourhood counts less, else its border shows.
+    const auto perNoise = static_cast<float>(1 / variance_);
+    const float edge = static_cast<float>(reach_) / static_cast<float>(reach_ + 1);
+    const auto taper = [&](float u) {
+        const float v = 1 - edge * edge * u * u;
+        return v * v;
+    };
+    for (int i = 0; i < n; ++i)
+        predicted_[static_cast<std::size_t>(i)] *= perNoise * taper(row(1)[i]) * taper(row(2)[i]);
+    scatter(predicted_.data(), sums + TilePlanes::plane(out.weight()));
+    // Kriging variance, on average over the data: the constant and each effective function cost one part in
+    // as many as there are.
+    const auto part = static_cast<float>((1 + drift.effective) / total_);
+    const float krigingVariance = static_cast<float>(variance_) * part;
+    for (int i = 0; i < n; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        float* const sum = sums + index_[k];
+        sum[TilePlanes::plane(out.variance())] += predicted_[k] * krigingVariance;
+        sum[TilePlanes::plane(out.leverage())] += predicted_[k] * std::min(1.f, weights_[k] * part);
+    }
+    estimates_.resize(static_cast<std::size_t>(4 * padded));
+    float* const estimate = estimates_.data();
+    float *const about = estimate + padded, *const sum = about + padded, *const square = sum + padded;
+    std::array<float, kMaxRandomDrift> coefficients;
+    for (int c = 0; c < tile_.radiance; ++c) {
+        double offset = tile_.means[TilePlanes::plane(c) + centre_] + gram(1 + functions_ + c, 0) / total_;
+        coefficients.fill(0);
+        for (std::size_t i = 0; i < used_.size(); ++i) {
+            const double b = drift.coefficients(static_cast<Eigen::Index>(i), c) * unit_[i];
+            coefficients[static_cast<std::size_t>(used_[i] - 1)] = static_cast<float>(b);
+            offset -= b * gram(used_[i], 0) / total_;
+        }
+        predictRow(row(1), coefficients.data(), functions_, stride_, n, static_cast<float>(offset), estimate);
+        const float* references = tile_.references + TilePlanes::plane(c);
+        for (int i = 0; i < n; ++i) about[i] = references[index_[static_cast<std::size_t>(i)]];
+        addEstimates(estimate, about, predicted_.data(), n, sum, square);
+        scatter(sum, sums + TilePlanes::plane(out.sum(c)));
+        if (c < 3) scatter(square, sums + TilePlanes::plane(out.square(c)));
+    }
+}
+
+void Centre::scatter(const float* values, float* to) const {
+    for (int i = 0; i < size(); ++i) to[index_[static_cast<std::size_t>(i)]] += values[i];
+}
+
+}  // namespace vlx

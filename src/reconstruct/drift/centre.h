@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "reconstruct/drift/neighbourhoods.h"
+#include "variolux/geostat/random_drift.h"
+
+/// Kriging with external drift in one neighbourhood: METHOD.md 7.2 to 7.4.
+namespace vlx {
+
+inline constexpr int kPositionFunctions = 5;  ///< x, y, x^2, y^2, xy
+inline constexpr float kFarthest = 3.6f;      ///< composite distance: data farther away weigh nothing
+inline constexpr float kFeatureWidth2 =
+    0.04f;  ///< (a fifth of a feature's scale)^2: as unlike as noise of one
+
+/// What a tile holds of one half, in planes of kTileSide x kTileSide.
+struct TilePlanes {
+    const float* means = nullptr;       ///< radiance channels
+    const float* counts = nullptr;      ///< samples: 0 is no datum
+    const float* errors = nullptr;      ///< error variance of a mean, averaged over R, G, B
+    const float* references = nullptr;  ///< radiance channels: what estimates are summed about
+    const float* features = nullptr;    ///< FeaturePlanes
+    int radiance = 3, featureCount = 0;
+    const std::vector<int>* group = nullptr;  ///< of each feature
+    int groups = 0;
+
+    static std::size_t plane(int k) { return static_cast<std::size_t>(k) * kTileSide * kTileSide; }
+};
+
+/// A centre and the data around it. Its memory is kept for the next.
+class Centre {
+  public:
+    /// Begins at place `at` of the tile's planes.
+    void begin(const TilePlanes& tile, int at, int reach);
+    /// The pixel (dx, dy) away, which is `alike` the centre (0 to 1).
+    void add(int dx, int dy, float alike);
+    /// Kriges, and adds what is predicted for all its pixels to `sums` (EstimatePlanes of one half).
+    void krige(float* sums, NeighbourhoodCounts& counts);
+
+  private:
+    int size() const { return static_cast<int>(index_.size()); }
+    float* row(int r) { return rows_.data() + r * stride_; }
+    double gram(int a, int b) const {
+        return gram_[static_cast<std::size_t>(a >= b ? a * gramRows_ + b : b * gramRows_ + a)];
+    }
+    /// Sums of products about the weighted means.
+    double centred(int a, int b) const { return gram(a, b) - gram(a, 0) * gram(b, 0) / total_; }
+    void stackFunctions();
+    void stackRadiance();
+    RandomDrift fit();
+    void predict(const RandomDrift& drift, float* sums);
+    void scatter(const float* values, float* to) const;
+
+    TilePlanes tile_;
+    std::size_t centre_ = 0;
+    int reach_ = 0, stride_ = 0;
+    std::vector<int> index_;                  // of the data, in a plane
+    std::vector<float> weights_, predicted_;  // of the data; of what is predicted there
+    double noise_ = 0, total_ = 0;            // sums over data: of weighted error variances, of weights
+    double variance_ = 0;                     // of a datum of weight 1
+
+    /// Rows as long as there are data, each `stride_` apart: 1, position functions, features that vary,
+    /// radiance.
+    std::vector<float> rows_, weighted_, sorted_, estimates_;
+    std::vector<int> varying_;                            // features
+    std::array<double, kMaxRandomDrift> featureNoise_{};  // of each of them: summed weighted error variances
+    int functions_ = 0, gramRows_ = 0;
+    std::vector<double> gram_;
+
+    std::vector<int> used_, group_;  // rows that are drift functions: those that are not constant
+    std::array<double, kMaxRandomDrift> unit_{};  // one over the standard deviation of each
+};
+
+}  // namespace vlx
