@@ -173,7 +173,7 @@ TEST_F(Appending, BadMapsAndDumpsAreErrorsThatSayWhatWasFound) {
     EXPECT_NE(message(whole).find("found none"), std::string::npos);
     map([](int, int) { return 1.f; }, "Y");
     EXPECT_EQ(message(whole), "no error");
-    EXPECT_NE(message({0, 0, 22, 18}).find("expected 22x18"), std::string::npos);
+    EXPECT_NE(message({0, 0, 22, 18}).find("expected 22 x 18"), std::string::npos) << message({0, 0, 22, 18});
     writeImage(folder / "map.exr", Image(whole, {"R", "G", "B"}));
     EXPECT_NE(message(whole).find("found R, G, B"), std::string::npos) << message(whole);
 
