@@ -24,7 +24,8 @@ struct GatheredPlanes {
     int brightestLuminance() const { return brightest() + radiance; }
     int secondLuminance() const { return brightest() + radiance + 1; }
     int brightestHalf() const { return brightest() + radiance + 2; }
-    int channels() const { return brightest() + radiance + 3; }
+    int clamped() const { return brightest() + radiance + 3; }  ///< R, G, B: taken off the mean by a clamp
+    int channels() const { return brightest() + radiance + 6; }
 };
 
 /// What is kriged: means of the halves.
@@ -123,9 +124,14 @@ struct DifferencePlanes {
     int channels() const { return radiance + 8; }
 };
 
-/// Light that fireflies lost, and light that is there, summed along a row.
+/// Light that a pixel's estimate lacks, and light that it has.
 struct LightPlanes {
-    static constexpr int kChannels = 7;  ///< lost of R, G, B; its square; R, G, B
+    static constexpr int lost(int c) { return c; }       ///< R, G, B taken off as a firefly's
+    static constexpr int kLostSquare = 3;                ///< summed over R, G, B
+    static constexpr int apart(int c) { return 4 + c; }  ///< R, G, B of the samples' mean less the estimate
+    static constexpr int kNoise = 7;  ///< variance of `lost` and `apart`, summed over R, G, B
+    static constexpr int light(int c) { return 8 + c; }  ///< R, G, B of the estimate
+    static constexpr int kChannels = 11;
 };
 
 /// Mean of all samples of a pixel; 0 where it has none.
