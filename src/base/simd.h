@@ -55,9 +55,8 @@ template <class V>
 }
 template <class V>
 [[gnu::always_inline]] inline V squareRoot(V x) {
-    V y;
-    for (int i = 0; i < kLanes<V>; ++i) y[i] = __builtin_sqrt(x[i]);
-    return y;
+    for (int i = 0; i < kLanes<V>; ++i) x[i] = __builtin_sqrt(x[i]);
+    return x;
 }
 
 /// scale + scale * rest, scale = 2^k.

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
+#include "compare/constants.h"
 #include "compare/ssim.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
@@ -14,18 +14,10 @@ namespace vlx {
 
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kEpsilon = 0.01;
-
-std::string describe(const Window& window) {
-    return std::to_string(window.width) + " x " + std::to_string(window.height) + " pixels at (" +
-           std::to_string(window.x) + ", " + std::to_string(window.y) + ")";
-}
-
 void requireSameWindow(const Image& reference, const Image& image, const std::string& path) {
     if (image.data != reference.data)
-        throw Error(path, "expected the reference's data window, " + describe(reference.data) + ", found " +
-                              describe(image.data));
+        throw Error(path, "expected the reference's data window, " + windowText(reference.data) + ", found " +
+                              windowText(image.data));
 }
 
 bool isFinite(const float* pixel) {
@@ -170,9 +162,9 @@ Comparison compareColour(const Image& reference, const Image& image, const std::
                 const double truth = r[c];
                 const double squared = (value - truth) * (value - truth);
                 const double displayed = toneMapped(value) - toneMapped(truth);
-                relative += squared / (truth * truth + kEpsilon);
+                relative += squared / (truth * truth + kRelativeFloor);
                 sums.squared += squared;
-                sums.absolute += std::abs(value - truth) / (std::abs(truth) + kEpsilon);
+                sums.absolute += std::abs(value - truth) / (std::abs(truth) + kRelativeFloor);
                 sums.toneMapped += displayed * displayed;
                 sums.image += value;
                 sums.reference += truth;

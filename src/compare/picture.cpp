@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "compare/canvas.h"
+#include "compare/constants.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/parallel.h"
@@ -30,7 +31,6 @@ constexpr int kWidestPicture = 2400;
 constexpr int kFrame = 3;
 constexpr int kLegendHeight = 2 * kMargin + 4 * kLineHeight + 24;
 constexpr double kRelativeDecades = 3;  // 0.1 % to 100 %
-constexpr double kEpsilon = 0.01;
 
 struct Panel {
     std::string caption;
@@ -38,16 +38,11 @@ struct Panel {
     Image picture;  // display values
 };
 
-std::string describe(const Window& window) {
-    return std::to_string(window.width) + " x " + std::to_string(window.height) + " pixels at (" +
-           std::to_string(window.x) + ", " + std::to_string(window.y) + ")";
-}
-
 void requireOneWindow(const Window& expected, const std::vector<CaptionedImage>& images) {
     for (const CaptionedImage& entry : images)
         if (entry.image.data != expected)
-            throw Error(entry.name, "expected the data window " + describe(expected) + ", found " +
-                                        describe(entry.image.data));
+            throw Error(entry.name, "expected the data window " + windowText(expected) + ", found " +
+                                        windowText(entry.image.data));
 }
 
 void requireInside(const std::vector<Window>& crops, const Window& data) {
@@ -55,7 +50,7 @@ void requireInside(const std::vector<Window>& crops, const Window& data) {
         if (crop.width <= 0 || crop.height <= 0 || !data.contains(crop.x, crop.y) ||
             crop.width > data.width - (crop.x - data.x) || crop.height > data.height - (crop.y - data.y))
             throw Error("crop",
-                        "expected a part of the image, " + describe(data) + ", found " + describe(crop));
+                        "expected a part of the image, " + windowText(data) + ", found " + windowText(crop));
 }
 
 DisplayColour cropColour(std::size_t index) { return kCropColours[index % kCropColours.size()]; }
@@ -144,7 +139,7 @@ double relativeError(const float* reference, const float* image) {
     double sum = 0;
     for (int c = 0; c < 3; ++c)
         sum += std::abs(static_cast<double>(image[c]) - reference[c]) /
-               (std::abs(static_cast<double>(reference[c])) + kEpsilon);
+               (std::abs(static_cast<double>(reference[c])) + kRelativeFloor);
     return sum / 3;
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "dump/exr_header.h"
+#include "edit/band_rows.h"
 #include "variolux/base/text.h"
 #include "variolux/dump/layers.h"
 #include "variolux/dump/reader.h"
@@ -15,8 +16,6 @@
 namespace vlx {
 
 namespace {
-
-constexpr int kBandRows = 16;
 
 const char* typeText(ChannelType type) {
     switch (type) {

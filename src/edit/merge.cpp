@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "dump/exr_header.h"
+#include "edit/band_rows.h"
 #include "edit/merge_flat.h"
 #include "exr/part_layout.h"
 #include "exr/raw_file.h"
@@ -20,8 +21,6 @@
 namespace vlx {
 
 namespace {
-
-constexpr int kBandRows = 16;
 
 // Whether an OpenEXR file says that it has deep parts; other files are flat images or nothing at all.
 bool isDeep(const std::string& path) {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "base/image_library.h"
+#include "edit/band_rows.h"
 #include "exr/flat_images.h"
 #include "exr/part_layout.h"
 #include "variolux/base/error.h"
@@ -16,7 +17,6 @@ namespace vlx {
 
 namespace {
 
-constexpr int kBandRows = 16;
 // Bytes of a band of rows.
 constexpr std::uint64_t kMaxBandBytes = std::uint64_t{1} << 31;
 

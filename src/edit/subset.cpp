@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "edit/band_rows.h"
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
 #include "variolux/dump/reader.h"
@@ -16,7 +17,6 @@ namespace vlx {
 
 namespace {
 
-constexpr int kBandRows = 16;
 constexpr const char* kReplicate = "sample.replicate";
 
 template <typename Body>

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <limits>
 
-/// Names that the source files of KrigingSystem and CovarianceSystem share.
+/// Names that the source files of this library share.
 namespace vlx {
 
 using Eigen::Index;

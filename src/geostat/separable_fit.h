@@ -1,15 +1,14 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <vector>
 
+#include "geostat/kriging_names.h"
 #include "variolux/geostat/variogram_fit.h"
 
 /// The search behind fitVariogram(): separable least squares over the classes of an empirical variogram.
 namespace vlx::separable {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMaxStructures = 3;
 
 /// The classes in use, distances and semivariances scaled to at most 1.

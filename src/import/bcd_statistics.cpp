@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdio>
 
 #include "import/bcd.h"
 #include "import/channel_presets.h"
@@ -11,11 +10,7 @@ namespace vlx {
 
 namespace {
 
-std::string binName(std::size_t number) {
-    char name[24];
-    std::snprintf(name, sizeof name, "Bin_%04zu", number);
-    return name;
-}
+std::string binName(std::size_t number) { return formatted("Bin_%04.0f", static_cast<double>(number)); }
 
 }  // namespace
 

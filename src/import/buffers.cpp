@@ -12,8 +12,6 @@ namespace vlx {
 
 namespace {
 
-constexpr float kUnknown = -1;
-
 // Compares what the difference of the halves says about the variance of their mean with what was given.
 struct Agreement {
     double measured = 0;
@@ -95,7 +93,7 @@ ImportReport importBuffers(const std::string& a, const std::string& b, const std
                         replicate ? static_cast<float>(half) : images.value(taken[next].of[half], p);
                     if (channel.name == "Z") cleanDepth(value);
                     if (channel.name.starts_with("variance."))
-                        value = std::isfinite(value) ? 2 * std::max(value, 0.0f) : kUnknown;
+                        value = std::isfinite(value) ? 2 * std::max(value, 0.0f) : kUnknownVariance;
                     values.push_back(value);
                 }
             if (!replicate) ++next;

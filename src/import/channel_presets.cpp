@@ -72,7 +72,7 @@ ChannelMap pbrtMap(const Names& names) {
     return map;
 }
 
-StackPreset recognise(const Names& names) {
+StackPreset recogniseStack(const Names& names) {
     if (cyclesLayer(names)) return StackPreset::Cycles;
     if (contains(names, "Albedo.R") && contains(names, "Ns.X")) return StackPreset::Pbrt;
     const bool mitsuba = !layersWith(names, ".T").empty() || contains(names, "nn.X") ||
@@ -120,7 +120,7 @@ std::optional<std::string> cyclesLayer(const Names& names) {
 
 ChosenMap chooseStackMap(const std::string& path, const Names& names, const StackOptions& options) {
     ChosenMap chosen;
-    chosen.preset = options.preset == StackPreset::Auto ? recognise(names) : options.preset;
+    chosen.preset = options.preset == StackPreset::Auto ? recogniseStack(names) : options.preset;
     switch (chosen.preset) {
         case StackPreset::Cycles: {
             const auto layer = cyclesLayer(names);

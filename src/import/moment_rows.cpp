@@ -12,10 +12,9 @@ namespace vlx {
 
 namespace {
 
-constexpr double kUnknown = -1;
 constexpr int kWrittenRows = 32;
 // Values of a band to be written, at four bytes, a few times.
-constexpr std::size_t kBandValues = std::size_t{8} << 20;
+constexpr std::size_t kWrittenValues = std::size_t{8} << 20;
 
 // Rec. 709 primaries, D65.
 constexpr double kRgbOfXyz[3][3] = {{3.2404542, -1.5371385, -0.4985314},
@@ -63,7 +62,7 @@ MomentRows::Triple MomentRows::triple(const std::array<FlatChannel, 3>& channels
     return values;
 }
 
-// Of the mean; kUnknown where there is none.
+// Of the mean; kUnknownVariance where there is none.
 MomentRows::Triple MomentRows::variance(std::size_t pixel, Doubts& doubts) const {
     const Triple given = triple(channels_.variance, pixel);
     const Triple first = triple(channels_.first ? *channels_.first : channels_.mean, pixel);
@@ -77,7 +76,7 @@ MomentRows::Triple MomentRows::variance(std::size_t pixel, Doubts& doubts) const
         if (v < 0) ++doubts.negative;
         if (!(v >= 0) || !std::isfinite(v)) {  // no variance of anything
             ++doubts.unknown;
-            return {kUnknown, kUnknown, kUnknown};
+            return {kUnknownVariance, kUnknownVariance, kUnknownVariance};
         }
         result[c] = v;
     }
@@ -168,7 +167,7 @@ ImportReport MomentRows::report() const {
 void writeSamples(const SampleSource& source, const std::string& dump, const Progress& progress) {
     const DumpHeader& header = source.header();
     const std::size_t row = static_cast<std::size_t>(header.data.width) * header.channels.size() * 2;
-    const int bandRows = static_cast<int>(std::clamp<std::size_t>(kBandValues / row, 1, kWrittenRows));
+    const int bandRows = static_cast<int>(std::clamp<std::size_t>(kWrittenValues / row, 1, kWrittenRows));
     DumpWriter writer(dump, header);
     for (int done = 0; done < header.data.height;) {
         const int rows = std::min(bandRows, header.data.height - done);

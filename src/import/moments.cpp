@@ -59,7 +59,7 @@ Names nestedIntegrators(const Names& names) {
     return nested;
 }
 
-MomentPreset recognise(const Names& names) {
+MomentPreset recogniseMoments(const Names& names) {
     if (!nestedIntegrators(names).empty()) return MomentPreset::Mitsuba;
     if (contains(names, "RelativeVariance.R")) return MomentPreset::Pbrt;
     if (findTriple(names, {"mse"})) return MomentPreset::RenderMan;
@@ -160,7 +160,8 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
     auto opened = std::make_unique<FlatImages>(paths);
     FlatImages& images = *opened;
     const Names& names = images.channels(0);
-    const MomentPreset preset = options.preset == MomentPreset::Auto ? recognise(names) : options.preset;
+    const MomentPreset preset =
+        options.preset == MomentPreset::Auto ? recogniseMoments(names) : options.preset;
     const Convention convention = conventionOf(preset);
 
     Origins origins;

@@ -10,6 +10,9 @@
 
 namespace vlx {
 
+/// In a dump, of a pixel whose variance is not known (FORMAT.md).
+inline constexpr float kUnknownVariance = -1;
+
 /// What renderers call a pixel's variance. n: samples a pixel; x: one of them.
 enum class VarianceMeaning {
     OfSample,      ///< of a single sample, unbiased: the mean's is this / n

@@ -6,13 +6,13 @@
 #include <limits>
 #include <random>
 
+#include "compare/constants.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
 
 namespace vlx {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
 Image constant(int width, int height, float value) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "compare/constants.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/parallel.h"
@@ -13,7 +14,6 @@
 namespace vlx {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 // The layout that picture.cpp states: panels begin below a margin and two lines of text.
 constexpr int kLeft = 10;
 constexpr int kTop = 10 + 2 * 22;

@@ -6,12 +6,11 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "compare/constants.h"
 #include "variolux/base/error.h"
 
 namespace vlx {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 ReportEntry entry(const std::string& name, Metric metric, double value) {
     ReportEntry result{name + ".exr", name, {"R", "G", "B"}, {}, {}};

@@ -7,10 +7,10 @@
 #include <limits>
 #include <random>
 
+#include "compare/constants.h"
+
 namespace vlx {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(StudentQuantile95, PublishedTable) {
     // Abramowitz and Stegun, table 26.10, P = 0.975.

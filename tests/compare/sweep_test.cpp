@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "compare/constants.h"
 #include "sweep/sweep_images.h"
 #include "sweep/sweep_page.h"
 #include "sweep/sweep_summary.h"
@@ -14,8 +15,6 @@
 
 namespace vlx {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// A made-up sweep in which tracing takes 1/8 s a sample: averaging has relmse 1/spp, "better" takes a second
 /// more for a quarter of the error, "worse" two for the same error. Repetitions differ by a factor.

@@ -4,11 +4,10 @@
 #include <random>
 
 #include "exr/chunk_codec.h"
+#include "test_dumps.h"
 
 namespace vlx {
 namespace {
-
-constexpr DumpCompression kAll[] = {DumpCompression::None, DumpCompression::Rle, DumpCompression::Zips};
 
 // Runs of random lengths and values: what run-length coding has its borders in.
 Bytes runs(std::mt19937& random, std::size_t size) {
@@ -23,7 +22,7 @@ Bytes runs(std::mt19937& random, std::size_t size) {
 
 TEST(ChunkCodec, GivesBackEveryBlock) {
     std::mt19937 random(7);
-    for (const DumpCompression compression : kAll) {
+    for (const DumpCompression compression : kAllCompressions) {
         Packer packer(compression);
         Unpacker unpacker(compression);
         for (std::size_t size = 0; size < 700; ++size) {

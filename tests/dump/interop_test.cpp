@@ -17,9 +17,6 @@
 namespace vlx {
 namespace {
 
-const CountOf kAdaptive = [](int col, int row) { return (col * 5 + row * 3) % 7 * ((col + row) % 3); };
-constexpr DumpCompression kAll[] = {DumpCompression::None, DumpCompression::Rle, DumpCompression::Zips};
-
 TestDump makeCase(DumpCompression compression) {
     TestDump dump = makeDump({-7, 12, 29, 18}, mixedChannels(), kAdaptive);
     dump.header.display = {0, 0, 100, 60};
@@ -63,7 +60,7 @@ SampleBand readWithOiio(const std::string& path, int part) {
 
 TEST(DumpInterop, ReadsWhatOpenExrWrites) {
     const TemporaryFolder folder;
-    for (const DumpCompression compression : kAll)
+    for (const DumpCompression compression : kAllCompressions)
         for (const bool decreasingY : {false, true})
             for (const bool severalParts : {false, true}) {
                 const TestDump dump = makeCase(compression);
@@ -78,7 +75,7 @@ TEST(DumpInterop, ReadsWhatOpenExrWrites) {
 
 TEST(DumpInterop, OpenExrReadsWhatWeWrite) {
     const TemporaryFolder folder;
-    for (const DumpCompression compression : kAll) {
+    for (const DumpCompression compression : kAllCompressions) {
         const TestDump dump = makeCase(compression);
         writeDump(folder / "a.exr", dump);
         expectSame(channelsOf(dump.all, sortedNames(dump.all)), readWithOpenExr(folder / "a.exr", 1));
@@ -87,7 +84,7 @@ TEST(DumpInterop, OpenExrReadsWhatWeWrite) {
 
 TEST(DumpInterop, OpenImageIoReadsWhatWeWrite) {
     const TemporaryFolder folder;
-    for (const DumpCompression compression : kAll) {
+    for (const DumpCompression compression : kAllCompressions) {
         const TestDump dump = makeCase(compression);
         writeDump(folder / "a.exr", dump);
         const SampleBand found = readWithOiio(folder / "a.exr", 1);

@@ -18,6 +18,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "openexr_files.h"
+
 namespace vlx {
 
 /// What an attribute of a type of somebody's own holds.
@@ -45,11 +47,6 @@ OPENEXR_IMF_INTERNAL_NAMESPACE_SOURCE_EXIT
 namespace vlx {
 
 namespace {
-
-Imf::PixelType pixelType(ChannelType type) {
-    if (type == ChannelType::Half) return Imf::HALF;
-    return type == ChannelType::Uint ? Imf::UINT : Imf::FLOAT;
-}
 
 Imf::Slice slice(Imf::PixelType type, const std::string& bytes, const Window& w) {
     const std::size_t size = type == Imf::HALF ? 2 : 4;

@@ -28,15 +28,14 @@ constexpr int kFlips = 4000;
 constexpr std::size_t kTruncationStep = 3;
 #endif
 
-constexpr DumpCompression kAll[] = {DumpCompression::None, DumpCompression::Rle, DumpCompression::Zips};
 constexpr Window kWindow{3, -2, 11, 9};
-const CountOf kAdaptive = [](int col, int row) { return (col * 5 + row * 3) % 4; };
+const CountOf kFew = [](int col, int row) { return (col * 5 + row * 3) % 4; };
 
 // A small dump in the file's bytes, and where things are in them.
 struct Victim {
     explicit Victim(DumpCompression compression, bool byOpenExr = false) {
         const TemporaryFolder folder;
-        dump = makeDump(kWindow, mixedChannels(), kAdaptive);
+        dump = makeDump(kWindow, mixedChannels(), kFew);
         dump.header.compression = compression;
         if (byOpenExr)
             writeWithOpenExr(folder / "a.exr", dump);
@@ -99,7 +98,7 @@ class Malformed : public testing::Test {
 };
 
 TEST_F(Malformed, EveryTruncationIsAnError) {
-    for (const DumpCompression compression : kAll)
+    for (const DumpCompression compression : kAllCompressions)
         for (const bool byOpenExr : {false, true}) {
             const Victim victim(compression, byOpenExr);
             ASSERT_EQ(outcome(victim.bytes), "");
@@ -123,7 +122,7 @@ TEST_F(Malformed, EveryTruncationIsAnError) {
 TEST_F(Malformed, RandomDamageIsAnErrorOrABand) {
     std::mt19937 random(20240607);
     int errors = 0;
-    for (const DumpCompression compression : kAll)
+    for (const DumpCompression compression : kAllCompressions)
         for (const bool byOpenExr : {false, true}) {
             const Victim victim(compression, byOpenExr);
             for (int i = 0; i < kFlips / 2; ++i) {
@@ -151,7 +150,7 @@ TEST_F(Malformed, RandomDamageToTheHeader) {
 
 TEST_F(Malformed, LyingChunksNameScanlineChunkAndReason) {
     const std::uint64_t claims[] = {0, 1, 2147483647, 2147483648, 1ull << 40, 1ull << 63, ~0ull};
-    for (const DumpCompression compression : kAll) {
+    for (const DumpCompression compression : kAllCompressions) {
         const Victim victim(compression);
         const auto head = static_cast<std::size_t>(victim.chunk(6));
         for (const std::size_t field : {8, 16, 24})  // packed counts, packed samples, unpacked samples
@@ -204,7 +203,7 @@ TEST_F(Malformed, DecreasingCountsAndWrongSums) {
 }
 
 TEST_F(Malformed, HugeWindowsAreRefusedWhenOpened) {
-    for (const DumpCompression compression : kAll) {
+    for (const DumpCompression compression : kAllCompressions) {
         const Victim victim(compression);
         const std::size_t window = victim.attribute("dataWindow", "box2i");
         const auto claim = [&](int minX, int minY, int maxX, int maxY) {
@@ -294,7 +293,7 @@ TEST_F(Malformed, FileThatShrinksWhileItIsRead) {
 
 // Text for a terminal shows no control characters, JSON no broken UTF-8.
 TEST_F(Malformed, HostileNamesAreShownSafely) {
-    TestDump dump = makeDump(kWindow, mixedChannels(), kAdaptive);
+    TestDump dump = makeDump(kWindow, mixedChannels(), kFew);
     dump.header.renderer = "\x1b[2J\xff\n";
     writeDump(path_, dump);
     const DumpInfo info = inspectDump(path_);

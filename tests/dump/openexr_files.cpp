@@ -18,12 +18,12 @@
 
 namespace vlx {
 
-namespace {
-
 Imf::PixelType pixelType(ChannelType type) {
     if (type == ChannelType::Half) return Imf::HALF;
     return type == ChannelType::Uint ? Imf::UINT : Imf::FLOAT;
 }
+
+namespace {
 
 std::size_t typeBytes(Imf::PixelType type) { return type == Imf::HALF ? 2 : 4; }
 

@@ -1,10 +1,15 @@
 #pragma once
 
+#include <ImfPixelType.h>
+
 #include <string>
 
 #include "test_dumps.h"
 
 namespace vlx {
+
+/// The same type in the words of OpenEXR.
+Imf::PixelType pixelType(ChannelType type);
 
 /// What OpenEXR's own classes write and read: the judge of Variolux's reader and writer.
 struct OpenExrFile {

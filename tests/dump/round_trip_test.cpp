@@ -14,8 +14,6 @@
 namespace vlx {
 namespace {
 
-const CountOf kAdaptive = [](int col, int row) { return (col * 7 + row * 13) % 5 * ((col + row) % 3); };
-
 struct Case {
     const char* name;
     Window data;

@@ -14,7 +14,7 @@
 namespace vlx {
 namespace {
 
-constexpr Window kWindow{-3, 5, 37, 29};
+constexpr Window kBuckets{-3, 5, 37, 29};
 
 DumpHeader headerOf(const Window& window) {
     DumpHeader header;
@@ -34,10 +34,10 @@ std::array<float, 5> sampleOf(int x, int y, int i) {
 
 std::vector<Window> tilesOf(int size) {
     std::vector<Window> tiles;
-    for (int y = kWindow.y; y < kWindow.y + kWindow.height; y += size)
-        for (int x = kWindow.x; x < kWindow.x + kWindow.width; x += size)
-            tiles.push_back({x, y, std::min(size, kWindow.x + kWindow.width - x),
-                             std::min(size, kWindow.y + kWindow.height - y)});
+    for (int y = kBuckets.y; y < kBuckets.y + kBuckets.height; y += size)
+        for (int x = kBuckets.x; x < kBuckets.x + kBuckets.width; x += size)
+            tiles.push_back({x, y, std::min(size, kBuckets.x + kBuckets.width - x),
+                             std::min(size, kBuckets.y + kBuckets.height - y)});
     return tiles;
 }
 
@@ -61,7 +61,7 @@ TEST(SampleWriter, TilesInAnyOrderFromManyThreadsGiveTheSameBytes) {
         auto tiles = tilesOf(size);
         for (unsigned run = 0; run < 3; ++run) {
             std::shuffle(tiles.begin(), tiles.end(), std::mt19937(run));
-            SampleWriter writer(folder / "a.exr", headerOf(kWindow));
+            SampleWriter writer(folder / "a.exr", headerOf(kBuckets));
             std::vector<std::thread> threads;
             const std::size_t workers = run + 1;
             for (std::size_t t = 0; t < workers; ++t)
@@ -82,10 +82,10 @@ TEST(SampleWriter, TilesInAnyOrderFromManyThreadsGiveTheSameBytes) {
 
     const DumpReader dump(folder / "a.exr");
     EXPECT_EQ(dump.header().renderSeconds, 1.5);
-    const SampleBand band = dump.read(kWindow.y, kWindow.height, {"R", "G", "B", "A", "sample.replicate"});
+    const SampleBand band = dump.read(kBuckets.y, kBuckets.height, {"R", "G", "B", "A", "sample.replicate"});
     std::size_t i = 0;
-    for (int y = kWindow.y; y < kWindow.y + kWindow.height; ++y)
-        for (int x = kWindow.x; x < kWindow.x + kWindow.width; ++x)
+    for (int y = kBuckets.y; y < kBuckets.y + kBuckets.height; ++y)
+        for (int x = kBuckets.x; x < kBuckets.x + kBuckets.width; ++x)
             for (int s = 0; s < countOf(x, y); ++s, ++i)
                 for (std::size_t c = 0; c < 5; ++c) ASSERT_EQ(band.values[c][i], sampleOf(x, y, s)[c]);
     EXPECT_EQ(band.samples(), i);
@@ -135,7 +135,7 @@ TEST(SampleWriter, PassesFollowEachOther) {
 TEST(SampleWriter, MisuseIsAnErrorAndLeavesNoFile) {
     const TemporaryFolder folder;
     {
-        SampleWriter writer(folder / "a.exr", headerOf(kWindow));
+        SampleWriter writer(folder / "a.exr", headerOf(kBuckets));
         EXPECT_NE(errorOf([&] { writer.tile({-4, 5, 3, 3}); }).find("within 37 x 29"), std::string::npos);
         EXPECT_NE(errorOf([&] { writer.tile({-3, 5, 0, 3}); }), "");
         EXPECT_NE(errorOf([&] { writer.tile({30, 5, 2147483647, 1}); }), "");
@@ -146,13 +146,13 @@ TEST(SampleWriter, MisuseIsAnErrorAndLeavesNoFile) {
         writer.add(std::move(tile));
     }
     EXPECT_EQ(folder.entries(), 0);
-    SampleWriter writer(folder / "a.exr", headerOf(kWindow));
+    SampleWriter writer(folder / "a.exr", headerOf(kBuckets));
     SampleTile late = writer.tile({0, 6, 2, 2});
     writer.close();
     EXPECT_NE(errorOf([&] { writer.add(std::move(late)); }).find("no more tiles"), std::string::npos);
     EXPECT_NE(errorOf([&] { writer.close(); }).find("closed already"), std::string::npos);
     EXPECT_EQ(DumpReader(folder / "a.exr").read(5, 29).samples(), 0u);
-    EXPECT_NE(errorOf([&] { SampleWriter(folder / "none/a.exr", headerOf(kWindow)); }), "");
+    EXPECT_NE(errorOf([&] { SampleWriter(folder / "none/a.exr", headerOf(kBuckets)); }), "");
 }
 
 }  // namespace

@@ -90,29 +90,29 @@ std::vector<float> flatChannel(const std::string& path, int part, const char* na
     return values;
 }
 
-const Window kWindow{-3, 5, 11, 13};
+const Window kLit{-3, 5, 11, 13};
 
 TEST(Splats, ReadingAddsThemToTheSamplesOfTheirReplicate) {
     const TemporaryFolder folder;
     for (const DumpCompression compression :
          {DumpCompression::None, DumpCompression::Rle, DumpCompression::Zips}) {
-        TestDump dump = samples(kWindow);
+        TestDump dump = samples(kLit);
         dump.header.compression = compression;
         write(folder / "a.exr", dump, 5);
         const DumpReader reader(folder / "a.exr");
         EXPECT_EQ(reader.header().splatReplicates, kReplicates);
         const std::vector<std::string> names = {"G", "R", "sample.replicate", "B"};
         const SampleBand all = expected(dump);
-        expectSame(all, reader.read(kWindow.y, kWindow.height, names));
-        expectSame(channelsOf(all, {"B"}), reader.read(kWindow.y, kWindow.height, {"B"}));
+        expectSame(all, reader.read(kLit.y, kLit.height, names));
+        expectSame(channelsOf(all, {"B"}), reader.read(kLit.y, kLit.height, {"B"}));
         expectSame(channelsOf(dump.all, {"sample.replicate"}),
-                   reader.read(kWindow.y, kWindow.height, {"sample.replicate"}));
+                   reader.read(kLit.y, kLit.height, {"sample.replicate"}));
     }
 }
 
 TEST(Splats, OtherProgramsReadTheParts) {
     const TemporaryFolder folder;
-    const TestDump dump = samples(kWindow);
+    const TestDump dump = samples(kLit);
     write(folder / "a.exr", dump, 4);
     // The samples as they were, the splats, and in `beauty` the mean of both.
     expectSame(channelsOf(dump.all, {"B", "G", "R", "sample.replicate"}),
@@ -120,8 +120,8 @@ TEST(Splats, OtherProgramsReadTheParts) {
     const std::vector<float> red = flatChannel(folder / "a.exr", 2, "r01.R");
     const std::vector<float> beauty = flatChannel(folder / "a.exr", 0, "G");
     for (std::size_t p = 0; p < dump.all.pixels(); ++p) {
-        const int x = kWindow.x + static_cast<int>(p) % kWindow.width,
-                  y = kWindow.y + static_cast<int>(p) / kWindow.width;
+        const int x = kLit.x + static_cast<int>(p) % kLit.width,
+                  y = kLit.y + static_cast<int>(p) / kLit.width;
         ASSERT_EQ(red[p], splatAt(x, y, 1, 0));
         double mean = 0;
         for (auto i = dump.all.offsets[p]; i < dump.all.offsets[p + 1]; ++i)
@@ -133,7 +133,7 @@ TEST(Splats, OtherProgramsReadTheParts) {
 
 TEST(Splats, SameBytesForAnyBands) {
     const TemporaryFolder folder;
-    const TestDump dump = samples(kWindow);
+    const TestDump dump = samples(kLit);
     write(folder / "a.exr", dump, 1);
     write(folder / "b.exr", dump, 13);
     EXPECT_EQ(fileBytes(folder / "a.exr"), fileBytes(folder / "b.exr"));
@@ -141,7 +141,7 @@ TEST(Splats, SameBytesForAnyBands) {
 
 TEST(Splats, SubsetsAndMergedDumpsHoldThemInTheirSamples) {
     const TemporaryFolder folder;
-    const TestDump dump = samples(kWindow);
+    const TestDump dump = samples(kLit);
     write(folder / "a.exr", dump, 13);
     const SampleBand all = expected(dump);
     mergeParts({folder / "a.exr"}, folder / "merged.exr", {.crop = true});
@@ -149,12 +149,12 @@ TEST(Splats, SubsetsAndMergedDumpsHoldThemInTheirSamples) {
     EXPECT_EQ(merged.header().splatReplicates, 0);
     EXPECT_TRUE(merged.header().replicatesShare);
     expectSame(channelsOf(all, {"R", "sample.replicate"}),
-               merged.read(kWindow.y, kWindow.height, {"R", "sample.replicate"}));
+               merged.read(kLit.y, kLit.height, {"R", "sample.replicate"}));
 
     subsetDump(folder / "a.exr", folder / "part.exr", {.samples = kEach});
     const DumpReader part(folder / "part.exr");
     EXPECT_EQ(part.header().splatReplicates, 0);
-    const SampleBand band = part.read(kWindow.y, kWindow.height, {"R"});
+    const SampleBand band = part.read(kLit.y, kLit.height, {"R"});
     ASSERT_EQ(band.samples(), band.pixels() * kEach);
     // One whole replicate, the same in every pixel.
     int matches = 0;
@@ -171,10 +171,10 @@ TEST(Splats, SubsetsAndMergedDumpsHoldThemInTheirSamples) {
 
 TEST(Splats, WritingThemIsNotForgotten) {
     const TemporaryFolder folder;
-    const TestDump dump = samples(kWindow);
+    const TestDump dump = samples(kLit);
     DumpWriter writer(folder / "a.exr", dump.header);
     writer.write(dump.all);
-    EXPECT_NE(errorOf([&] { writer.writeSplats(SplatImages(kWindow, 2)); }).find("3 replicates"),
+    EXPECT_NE(errorOf([&] { writer.writeSplats(SplatImages(kLit, 2)); }).find("3 replicates"),
               std::string::npos);
     EXPECT_NE(errorOf([&] { writer.close(); }).find("before the splats"), std::string::npos);
     EXPECT_FALSE(std::filesystem::exists(folder / "a.exr"));
@@ -182,20 +182,20 @@ TEST(Splats, WritingThemIsNotForgotten) {
 
 TEST(Splats, DamageIsAnError) {
     const TemporaryFolder folder;
-    TestDump dump = samples(kWindow);
+    TestDump dump = samples(kLit);
     dump.header.compression = DumpCompression::None;
     dump.all.values[2][3] = kReplicates;  // a replicate that has no splats
     write(folder / "a.exr", dump, 13);
     const DumpReader reader(folder / "a.exr");
-    EXPECT_NE(errorOf([&] { reader.read(kWindow.y, 1); }).find("replicate 3"), std::string::npos);
-    EXPECT_NO_THROW(reader.read(kWindow.y + 1, 1));
+    EXPECT_NE(errorOf([&] { reader.read(kLit.y, 1); }).find("replicate 3"), std::string::npos);
+    EXPECT_NO_THROW(reader.read(kLit.y + 1, 1));
 
     // The last bytes of the file are splats.
     std::vector<unsigned char> bytes = fileBytes(folder / "a.exr");
     bytes.resize(bytes.size() - 40);
     writeBytes(folder / "short.exr", bytes);
     const DumpReader damaged(folder / "short.exr");
-    EXPECT_NE(errorOf([&] { damaged.read(kWindow.y + kWindow.height - 1, 1); }).find("part splats"),
+    EXPECT_NE(errorOf([&] { damaged.read(kLit.y + kLit.height - 1, 1); }).find("part splats"),
               std::string::npos);
 }
 

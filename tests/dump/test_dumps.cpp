@@ -132,6 +132,11 @@ void writeBytes(const std::string& path, const std::vector<unsigned char>& bytes
     file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }
 
+bool anyContains(const std::vector<std::string>& texts, const std::string& part) {
+    return std::any_of(texts.begin(), texts.end(),
+                       [&](const std::string& text) { return text.find(part) != std::string::npos; });
+}
+
 std::string errorOf(const std::function<void()>& action) {
     try {
         action();

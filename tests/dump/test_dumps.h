@@ -10,6 +10,9 @@
 
 namespace vlx {
 
+inline constexpr DumpCompression kAllCompressions[] = {DumpCompression::None, DumpCompression::Rle,
+                                                       DumpCompression::Zips};
+
 /// A dump held whole: its header and all its rows as one band.
 struct TestDump {
     DumpHeader header;
@@ -21,6 +24,8 @@ std::vector<DumpChannel> mixedChannels();
 
 /// Samples of pixel (col, row), counted from the corner.
 using CountOf = std::function<int(int col, int row)>;
+/// None, one or several: at most 12.
+inline const CountOf kAdaptive = [](int col, int row) { return (col * 5 + row * 3) % 7 * ((col + row) % 3); };
 
 /// A dump of pseudo-random values that their types hold exactly: smooth ones, noise, and now and then
 /// zeros, infinities, NaN and denormal numbers.
@@ -41,6 +46,9 @@ void expectSame(const SampleBand& expected, const SampleBand& found);
 
 std::vector<unsigned char> fileBytes(const std::string& path);
 void writeBytes(const std::string& path, const std::vector<unsigned char>& bytes);
+
+/// Whether one of the texts contains the part.
+bool anyContains(const std::vector<std::string>& texts, const std::string& part);
 
 /// The message of the Error that `action` throws; fails the test when it throws none.
 std::string errorOf(const std::function<void()>& action);

@@ -12,14 +12,14 @@
 namespace vlx {
 namespace {
 
-constexpr Window kWindow{-3, 5, 6, 37};
+constexpr Window kTraced{-3, 5, 6, 37};
 
 /// `count` samples a pixel, all values of R different; sample i belongs to replicate i / perReplicate.
 TestDump numbered(int count, int perReplicate = 0) {
     TestDump dump;
-    dump.header.data = dump.header.display = kWindow;
+    dump.header.data = dump.header.display = kTraced;
     dump.header.renderSeconds = 8;
-    dump.all = {kWindow.x, kWindow.y, kWindow.width, kWindow.height, {0}, {"B", "G", "R"}, {}};
+    dump.all = {kTraced.x, kTraced.y, kTraced.width, kTraced.height, {0}, {"B", "G", "R"}, {}};
     if (perReplicate > 0) dump.all.channels.emplace_back("sample.replicate");
     dump.all.values.resize(dump.all.channels.size());
     for (std::size_t p = 0; p < dump.all.pixels(); ++p) {
@@ -38,7 +38,7 @@ TestDump numbered(int count, int perReplicate = 0) {
 
 SampleBand subset(const TemporaryFolder& folder, const SubsetOptions& options) {
     subsetDump(folder / "all.exr", folder / "part.exr", options);
-    return DumpReader(folder / "part.exr").read(kWindow.y, kWindow.height, {"R"});
+    return DumpReader(folder / "part.exr").read(kTraced.y, kTraced.height, {"R"});
 }
 
 TEST(Subset, PartsAreDisjointAndTogetherTheWholeDump) {
@@ -56,7 +56,7 @@ TEST(Subset, PartsAreDisjointAndTogetherTheWholeDump) {
     const DumpHeader header = DumpReader(folder / "part.exr").header();
     EXPECT_EQ(header.samples, 3.0);
     EXPECT_EQ(header.renderSeconds, 2.0);
-    EXPECT_EQ(header.data, kWindow);
+    EXPECT_EQ(header.data, kTraced);
 }
 
 TEST(Subset, SameSeedSameFileOtherSeedOthers) {
@@ -85,7 +85,7 @@ TEST(Subset, KeepsWholeReplicatesAndNumbersThemAnew) {
     for (std::uint32_t part = 0; part < 2; ++part) {
         subsetDump(folder / "all.exr", folder / "part.exr", {.samples = 6, .part = part});
         const SampleBand band =
-            DumpReader(folder / "part.exr").read(kWindow.y, kWindow.height, {"R", "sample.replicate"});
+            DumpReader(folder / "part.exr").read(kTraced.y, kTraced.height, {"R", "sample.replicate"});
         ASSERT_EQ(band.samples(), band.pixels() * 6);
         for (std::size_t i = 0; i < band.samples(); ++i) {
             EXPECT_EQ(band.values[1][i], static_cast<float>(i % 6 / 3));
@@ -102,7 +102,7 @@ TEST(Subset, KeepsWholeReplicatesAndNumbersThemAnew) {
 TEST(Subset, OneReplicateIsDividedBySamples) {
     const TemporaryFolder folder;
     writeDump(folder / "all.exr", numbered(8, 8));
-    EXPECT_EQ(subset(folder, {.samples = 2}).samples(), static_cast<std::size_t>(2 * kWindow.pixels()));
+    EXPECT_EQ(subset(folder, {.samples = 2}).samples(), static_cast<std::size_t>(2 * kTraced.pixels()));
 }
 
 TEST(Subset, SaysWhatTheDumpDoesNotHold) {

@@ -17,11 +17,6 @@
 namespace vlx {
 namespace {
 
-bool anyContains(const std::vector<std::string>& texts, const std::string& part) {
-    return std::any_of(texts.begin(), texts.end(),
-                       [&](const std::string& text) { return text.find(part) != std::string::npos; });
-}
-
 TEST(ImportBcdRaw, SamplesKeepTheirPlaces) {
     const TemporaryFolder folder;
     for (const int channels : {3, 4}) {

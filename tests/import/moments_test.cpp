@@ -20,12 +20,7 @@
 namespace vlx {
 namespace {
 
-constexpr Window kWindow{2, -1, 6, 37};
-
-bool anyContains(const std::vector<std::string>& texts, const std::string& part) {
-    return std::any_of(texts.begin(), texts.end(),
-                       [&](const std::string& text) { return text.find(part) != std::string::npos; });
-}
+constexpr Window kImages{2, -1, 6, 37};
 
 // A pixel's mean and variance as the dump has them, of R, G, B.
 struct Pixel {
@@ -62,10 +57,10 @@ float varianceOf(int c, int x, int y) {
 // Expects means and variances, in R, G, B, of every pixel.
 void expectMoments(const std::string& dump, double varianceFactor) {
     const auto pixels = pixelsOf(dump);
-    ASSERT_EQ(pixels.size(), static_cast<std::size_t>(kWindow.pixels()));
+    ASSERT_EQ(pixels.size(), static_cast<std::size_t>(kImages.pixels()));
     std::size_t p = 0;
-    for (int y = kWindow.y; y < kWindow.y + kWindow.height; ++y)
-        for (int x = kWindow.x; x < kWindow.x + kWindow.width; ++x, ++p)
+    for (int y = kImages.y; y < kImages.y + kImages.height; ++y)
+        for (int x = kImages.x; x < kImages.x + kImages.width; ++x, ++p)
             for (int c = 0; c < 3; ++c) {
                 ASSERT_NEAR(pixels[p].mean[c], meanOf(c, x, y), 1e-5);
                 ASSERT_NEAR(pixels[p].variance[c], varianceFactor * varianceOf(c, x, y), 1e-5);
@@ -73,7 +68,7 @@ void expectMoments(const std::string& dump, double varianceFactor) {
 }
 
 Image withVariance(const std::string& layer) {
-    return imageOf(kWindow, {"R", "G", "B", layer + ".R", layer + ".G", layer + ".B"},
+    return imageOf(kImages, {"R", "G", "B", layer + ".R", layer + ".G", layer + ".B"},
                    [](int c, int x, int y) { return c < 3 ? meanOf(c, x, y) : varianceOf(c - 3, x, y); });
 }
 
@@ -94,15 +89,15 @@ TEST(ImportMoments, EachConventionBecomesTheVarianceOfTheMean) {
         expectMoments(dump, 1);
         EXPECT_TRUE(anyContains(report.notes, "the variance of the mean"));
 
-        writeImage(folder / "color.exr", imageOf(kWindow, {"R", "G", "B"}, meanOf));
-        writeImage(folder / "colorVariance.exr", imageOf(kWindow, {"R", "G", "B"}, varianceOf));
+        writeImage(folder / "color.exr", imageOf(kImages, {"R", "G", "B"}, meanOf));
+        writeImage(folder / "colorVariance.exr", imageOf(kImages, {"R", "G", "B"}, varianceOf));
         options.preset = MomentPreset::Tungsten;
         options.with.variance = folder / "colorVariance.exr";
         importMoments(folder / "color.exr", dump, options);
         expectMoments(dump, 1);
 
         const DumpReader reader(dump);
-        EXPECT_EQ(reader.header().data, kWindow);
+        EXPECT_EQ(reader.header().data, kImages);
         EXPECT_EQ(findChannel(reader.header(), "sample.replicate") >= 0, halves);
         for (const Pixel& pixel : pixelsOf(dump)) ASSERT_EQ(pixel.samples, halves ? 2u : 1u);
     }
@@ -121,7 +116,7 @@ TEST(ImportMoments, PbrtsVariancesAreOfItsSensor) {
             return static_cast<float>(varianceOf(0, x, y) * white[channel - 19] * white[channel - 19]);
         return 0.5f;
     };
-    writeImage(folder / "pbrt.exr", imageOf(kWindow, channels, value));
+    writeImage(folder / "pbrt.exr", imageOf(kImages, channels, value));
     MomentOptions options;
     EXPECT_NE(errorOf([&] {
                   importMoments(folder / "pbrt.exr", folder / "d.exr", options);
@@ -134,14 +129,14 @@ TEST(ImportMoments, PbrtsVariancesAreOfItsSensor) {
     EXPECT_EQ(report.mapped.at("albedo.B"), "Albedo.B");
     const auto pixels = pixelsOf(folder / "d.exr");
     std::size_t p = 0;
-    for (int y = kWindow.y; y < kWindow.y + kWindow.height; ++y)
-        for (int x = kWindow.x; x < kWindow.x + kWindow.width; ++x, ++p)
+    for (int y = kImages.y; y < kImages.y + kImages.height; ++y)
+        for (int x = kImages.x; x < kImages.x + kImages.width; ++x, ++p)
             for (const double v : pixels[p].variance) ASSERT_NEAR(v, varianceOf(0, x, y) / 4, 1e-4);
     // Another sensor: as they are.
     options.xyz = false;
     importMoments(folder / "pbrt.exr", folder / "d.exr", options);
     EXPECT_NEAR(pixelsOf(folder / "d.exr")[0].variance[0],
-                varianceOf(0, kWindow.x, kWindow.y) * white[0] * white[0] / 4, 1e-5);
+                varianceOf(0, kImages.x, kImages.y) * white[0] * white[0] / 4, 1e-5);
 }
 
 // Mitsuba: (m2 - m^2) / (n - 1), from real samples: what Bessel's formula gives of them.
@@ -153,7 +148,7 @@ TEST(ImportMoments, MitsubasSecondMomentsGiveBesselsVariance) {
     std::exponential_distribution<double> noise(1);
     std::vector<double> means, variances;  // of Y
     std::vector<double> squares;
-    for (int p = 0; p < kWindow.pixels(); ++p) {
+    for (int p = 0; p < kImages.pixels(); ++p) {
         double sum = 0, sum2 = 0;
         for (int i = 0; i < kSamples; ++i) {
             const double v = noise(random);
@@ -166,14 +161,14 @@ TEST(ImportMoments, MitsubasSecondMomentsGiveBesselsVariance) {
     }
     const auto channels = mitsubaMomentChannels();
     const auto value = [&](int channel, int x, int y) {
-        const auto p = static_cast<std::size_t>((y - kWindow.y) * kWindow.width + x - kWindow.x);
+        const auto p = static_cast<std::size_t>((y - kImages.y) * kImages.width + x - kImages.x);
         const std::string& name = channels[static_cast<std::size_t>(channel)];
         const double w = white[name.back() == 'X' ? 0 : name.back() == 'Y' ? 1 : 2];
         if (name.starts_with("m2_img.") && name.size() == 8) return static_cast<float>(squares[p] * w * w);
         if (name.starts_with("img.") && name.size() == 5) return static_cast<float>(means[p] * w);
         return static_cast<float>(means[p]);
     };
-    writeImage(folder / "m.exr", imageOf(kWindow, channels, value));
+    writeImage(folder / "m.exr", imageOf(kImages, channels, value));
     MomentOptions options;
     options.samples = kSamples;
     const ImportReport report = importMoments(folder / "m.exr", folder / "d.exr", options);
@@ -266,7 +261,7 @@ TEST(ImportMoments, WhatCannotBeFoundIsAnErrorWithTheChannels) {
         writeImage(folder / "i.exr", image);
         return errorOf([&] { importMoments(folder / "i.exr", folder / "d.exr", options); });
     };
-    const Image plain = imageOf(kWindow, {"R", "G", "B"}, meanOf);
+    const Image plain = imageOf(kImages, {"R", "G", "B"}, meanOf);
     EXPECT_NE(outcome(plain, {}).find("expected the variance of each pixel"), std::string::npos);
     EXPECT_NE(outcome(withVariance("var"), {}).find("say what its variance is (--variance-is sample, "),
               std::string::npos);
@@ -324,7 +319,7 @@ TEST(ImportBuffers, HalvesWithVarianceAreCompared) {
 
 TEST(ImportBcdStatistics, CovariancesOfSamplesAndCounts) {
     const TemporaryFolder folder;
-    writeImage(folder / "i.exr", imageOf(kWindow, {"R", "G", "B"}, meanOf));
+    writeImage(folder / "i.exr", imageOf(kImages, {"R", "G", "B"}, meanOf));
     std::vector<std::string> bins;
     for (int i = 0; i < 61; ++i) {
         char name[16];
@@ -332,9 +327,9 @@ TEST(ImportBcdStatistics, CovariancesOfSamplesAndCounts) {
         bins.push_back(name);
     }
     writeImage(folder / "hist.exr",
-               imageOf(kWindow, bins, [](int c, int, int) { return c == 60 ? 32.0f : 1.0f; }));
+               imageOf(kImages, bins, [](int c, int, int) { return c == 60 ? 32.0f : 1.0f; }));
     bins.resize(6);
-    writeImage(folder / "cov.exr", imageOf(kWindow, bins, [](int c, int x, int y) {
+    writeImage(folder / "cov.exr", imageOf(kImages, bins, [](int c, int x, int y) {
                    return c < 3 ? varianceOf(c, x, y) : 0.1f;
                }));
     importBcdStatistics(folder / "i.exr", folder / "cov.exr", folder / "hist.exr", folder / "d.exr", {});
@@ -364,7 +359,7 @@ TEST(ImportMoments, InfoSeesTheVariance) {
 // Without the dump between: the same samples, rows in any order, halves rounded as a file would.
 TEST(OpenMoments, GivesWhatTheDumpHolds) {
     const TemporaryFolder folder;
-    writeImage(folder / "in.exr", imageOf(kWindow,
+    writeImage(folder / "in.exr", imageOf(kImages,
                                           {"R", "G", "B", "mse.R", "mse.G", "mse.B", "A", "albedo.R",
                                            "albedo.G", "albedo.B", "key.R", "key.G", "key.B", "id"},
                                           [](int c, int x, int y) {
@@ -398,7 +393,7 @@ TEST(OpenMoments, GivesWhatTheDumpHolds) {
 // Parts of R, G and B have no variance of their own; their halves must add up to those of the whole.
 TEST(OpenMoments, PartsOfTheLightAddUpInEachHalf) {
     const TemporaryFolder folder;
-    writeImage(folder / "in.exr", imageOf(kWindow,
+    writeImage(folder / "in.exr", imageOf(kImages,
                                           {"R", "G", "B", "mse.R", "mse.G", "mse.B", "key.R", "key.G",
                                            "key.B", "fill.R", "fill.G", "fill.B"},
                                           [](int c, int x, int y) {
@@ -412,7 +407,7 @@ TEST(OpenMoments, PartsOfTheLightAddUpInEachHalf) {
     options.radiance = {"key", "fill"};
     const SampleBand band =
         openMoments(folder / "in.exr", options)
-            ->read(kWindow.y, kWindow.height,
+            ->read(kImages.y, kImages.height,
                    {"R", "G", "B", "key.R", "key.G", "key.B", "fill.R", "fill.G", "fill.B"});
     ASSERT_EQ(band.samples(), 2 * band.pixels());
     for (std::size_t c = 0; c < 3; ++c)
@@ -430,7 +425,7 @@ TEST(OpenMoments, PartsOfTheLightAddUpInEachHalf) {
 
 TEST(OpenMoments, WithoutAVarianceSaysWhatIsMissing) {
     const TemporaryFolder folder;
-    writeImage(folder / "in.exr", imageOf(kWindow, {"R", "G", "B"}, meanOf));
+    writeImage(folder / "in.exr", imageOf(kImages, {"R", "G", "B"}, meanOf));
     const std::string text = errorOf([&] { openMoments(folder / "in.exr", {}); });
     EXPECT_NE(text.find("in.exr: expected the variance of each pixel"), std::string::npos) << text;
     for (const char* remedy : {"--variance", "vlx-pack stack", "vlx-pack buffers"})

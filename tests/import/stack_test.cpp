@@ -13,7 +13,7 @@
 namespace vlx {
 namespace {
 
-constexpr Window kWindow{4, -3, 7, 41};
+constexpr Window kStacked{4, -3, 7, 41};
 
 // Value of a channel of image `image` in a pixel: all different, exact in half.
 float valueOf(int image, int channel, int col, int row) {
@@ -24,10 +24,10 @@ std::vector<std::string> writeImages(const TemporaryFolder& folder, int count,
                                      const std::vector<std::string>& channels) {
     std::vector<std::string> paths;
     for (int i = 0; i < count; ++i) {
-        Image image(kWindow, channels);
+        Image image(kStacked, channels);
         image.display = {0, 0, 20, 50};
-        for (int row = 0; row < kWindow.height; ++row)
-            for (int col = 0; col < kWindow.width; ++col)
+        for (int row = 0; row < kStacked.height; ++row)
+            for (int col = 0; col < kStacked.width; ++col)
                 for (int c = 0; c < image.channelCount(); ++c)
                     image.at(col, row)[c] = valueOf(i, c, col, row);
         ImageWriteOptions options;
@@ -50,19 +50,19 @@ TEST(Stack, CyclesImagesBecomeSamples) {
     const ImportReport report = stackImages(images, folder / "dump.exr", {});
 
     const DumpReader reader(folder / "dump.exr");
-    EXPECT_EQ(reader.header().data, kWindow);
+    EXPECT_EQ(reader.header().data, kStacked);
     EXPECT_EQ(reader.header().display, (Window{0, 0, 20, 50}));
     EXPECT_EQ(reader.header().renderer, "Some Renderer 1.0");
     EXPECT_EQ(reader.header().samples, 5.0);
     const std::vector<std::string> names = {"R",        "G", "B",   "A",   "albedo.R", "albedo.G",
                                             "albedo.B", "Z", "N.X", "N.Y", "N.Z",      "sample.replicate"};
     EXPECT_EQ(reader.header().channels.size(), names.size());
-    const SampleBand band = reader.read(kWindow.y, kWindow.height, names);
+    const SampleBand band = reader.read(kStacked.y, kStacked.height, names);
     ASSERT_EQ(band.samples(), band.pixels() * 5);
     for (std::size_t p = 0; p < band.pixels(); ++p)
         for (std::size_t i = 0; i < 5; ++i) {
             ASSERT_EQ(band.offsets[p], p * 5);
-            const int col = static_cast<int>(p) % kWindow.width, row = static_cast<int>(p) / kWindow.width;
+            const int col = static_cast<int>(p) % kStacked.width, row = static_cast<int>(p) / kStacked.width;
             for (std::size_t c = 0; c < 11; ++c)
                 ASSERT_EQ(band.values[c][p * 5 + i],
                           valueOf(static_cast<int>(i), static_cast<int>(c), col, row));
@@ -84,7 +84,7 @@ TEST(Stack, MapGoesBeforeThePreset) {
     const DumpReader reader(folder / "dump.exr");
     EXPECT_EQ(reader.header().renderer, "mine");
     EXPECT_EQ(reader.header().compression, DumpCompression::Rle);
-    const SampleBand band = reader.read(kWindow.y, 1, {"R", "fog", "G"});
+    const SampleBand band = reader.read(kStacked.y, 1, {"R", "fog", "G"});
     EXPECT_EQ(band.values[0][1], valueOf(1, 11, 0, 0));
     EXPECT_EQ(band.values[1][1], valueOf(1, 11, 0, 0));
     EXPECT_EQ(band.values[2][1], valueOf(1, 1, 0, 0));
@@ -96,7 +96,7 @@ TEST(Stack, PlainNames) {
     const ImportReport report = stackImages(images, folder / "dump.exr", {});
     EXPECT_EQ(report.mapped.size(), 6u);
     EXPECT_EQ(report.ignored, std::vector<std::string>{"other"});
-    const SampleBand band = DumpReader(folder / "dump.exr").read(kWindow.y + 40, 1, {"sample.y"});
+    const SampleBand band = DumpReader(folder / "dump.exr").read(kStacked.y + 40, 1, {"sample.y"});
     EXPECT_EQ(band.values[0][2], valueOf(2, 5, 0, 40));
 }
 
@@ -141,7 +141,7 @@ TEST(Stack, ManyImages) {
     for (int i = 0; i < 230; ++i) images.push_back(few[static_cast<std::size_t>(i % 4)]);
     stackImages(images, folder / "dump.exr", {});
     const SampleBand band =
-        DumpReader(folder / "dump.exr").read(kWindow.y + 40, 1, {"G", "sample.replicate"});
+        DumpReader(folder / "dump.exr").read(kStacked.y + 40, 1, {"G", "sample.replicate"});
     ASSERT_EQ(band.samples(), 230u * 7u);
     EXPECT_EQ(band.values[0][229], valueOf(229 % 4, 1, 0, 40));
     EXPECT_EQ(band.values[1][229], 229.0f);
@@ -167,7 +167,7 @@ TEST(Stack, MisfitsAreErrorsThatNameTheFile) {
     images.push_back(folder / "other.exr");
     writeImage(images.back(), other);
     expectIn("other.exr: expected the windows of the first image", {});
-    writeImage(images.back(), Image(kWindow, {"L.Combined.R"}));
+    writeImage(images.back(), Image(kStacked, {"L.Combined.R"}));
     images.back() = folder / "missing.exr";
     expectIn("missing.exr: expected an image, found no such file", {});
     images.clear();
@@ -200,7 +200,7 @@ TEST(Stack, LayersOfRadianceAreKept) {
     const ImportReport report = stackImages(images, folder / "dump.exr", options);
     EXPECT_EQ(report.ignored, (std::vector<std::string>{"L.DiffDir.A", "L.Mist.Z"}));
     const SampleBand band =
-        DumpReader(folder / "dump.exr").read(kWindow.y, 1, {"L.DiffDir.G", "M.Combined.R"});
+        DumpReader(folder / "dump.exr").read(kStacked.y, 1, {"L.DiffDir.G", "M.Combined.R"});
     for (std::size_t i = 0; i < band.samples(); ++i) {
         const int image = static_cast<int>(i % 3), col = static_cast<int>(i / 3);
         ASSERT_EQ(band.values[0][i], valueOf(image, 14, col, 0));

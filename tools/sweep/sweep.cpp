@@ -28,7 +28,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr const char* kStddev = "stddev";
 
 /// One sweep while it runs.
 class Runner {

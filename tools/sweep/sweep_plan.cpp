@@ -20,8 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kStddev = "stddev";
-
 template <typename Value>
 void sortedOnce(std::vector<Value>& values) {
     std::sort(values.begin(), values.end());

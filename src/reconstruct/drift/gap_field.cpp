@@ -12,7 +12,7 @@ namespace {
 constexpr int kBlock = 8;
 
 /// Blocks of one scale: weighted sums, then means, of `values` numbers each.
-struct Level {
+struct BlockGrid {
     int columns, rows;
     std::vector<float> sums, weights;
 
@@ -22,7 +22,7 @@ struct Level {
     float& weight(int col, int row) { return weights[static_cast<std::size_t>(row * columns + col)]; }
 };
 
-Level makeLevel(int columns, int rows, int values) {
+BlockGrid makeGrid(int columns, int rows, int values) {
     const auto blocks = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
     return {columns, rows, std::vector<float>(blocks * static_cast<std::size_t>(values)),
             std::vector<float>(blocks)};
@@ -46,8 +46,8 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
     : values_(layout.radiance + layout.features + 1) {
     const DumpHeader& header = dump.header();
     const int width = header.data.width, height = header.data.height, distance = values_ - 1;
-    std::vector<Level> levels;
-    levels.push_back(makeLevel((width + kBlock - 1) / kBlock, (height + kBlock - 1) / kBlock, values_));
+    std::vector<BlockGrid> grids;
+    grids.push_back(makeGrid((width + kBlock - 1) / kBlock, (height + kBlock - 1) / kBlock, values_));
     RowRing ring(width, planes.channels(), 1);
     SampleBand band;
     for (int y = 0; y < height; ++y) {
@@ -56,8 +56,8 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
         for (int x = 0; x < width; ++x) {
             const auto of = [&](int plane) { return ring.row(plane, 0)[x]; };
             if (of(planes.count()) == 0) continue;
-            float* sums = levels[0].at(x / kBlock, y / kBlock, values_);
-            ++levels[0].weight(x / kBlock, y / kBlock);
+            float* sums = grids[0].at(x / kBlock, y / kBlock, values_);
+            ++grids[0].weight(x / kBlock, y / kBlock);
             for (int c = 0; c < layout.radiance; ++c)
                 sums[c] += (of(planes.halfCount(0)) * of(planes.mean(0) + c) +
                             of(planes.halfCount(1)) * of(planes.mean(1) + c)) /
@@ -68,16 +68,16 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
     // Pull: a block of the next scale is the mean of its four, each counting no more than a full one. What
     // was fetched from 8 x 8 pixels away has lain 4 pixels away on average, and so on.
     while (true) {
-        Level& fine = levels.back();
+        BlockGrid& fine = grids.back();
         for (std::size_t b = 0; b < fine.weights.size(); ++b) {
             float* sums = fine.sums.data() + b * static_cast<std::size_t>(values_);
             if (fine.weights[b] == 0) continue;
             for (int k = 0; k < distance; ++k) sums[k] /= fine.weights[b];
             fine.weights[b] = std::min(1.f, fine.weights[b]);
-            sums[distance] = static_cast<float>(kBlock << (levels.size() - 1)) / 2;
+            sums[distance] = static_cast<float>(kBlock << (grids.size() - 1)) / 2;
         }
         if (fine.columns == 1 && fine.rows == 1) break;
-        Level coarse = makeLevel((fine.columns + 1) / 2, (fine.rows + 1) / 2, values_);
+        BlockGrid coarse = makeGrid((fine.columns + 1) / 2, (fine.rows + 1) / 2, values_);
         for (int row = 0; row < fine.rows; ++row)
             for (int col = 0; col < fine.columns; ++col) {
                 const float w = fine.weight(col, row);
@@ -86,11 +86,11 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
                 for (int k = 0; k < distance; ++k) to[k] += w * from[k];
                 coarse.weight(col / 2, row / 2) += w;
             }
-        levels.push_back(std::move(coarse));
+        grids.push_back(std::move(coarse));
     }
     // Push: blocks without samples are read off the next scale, between its blocks.
-    for (std::size_t l = levels.size() - 1; l-- > 0;) {
-        Level &fine = levels[l], &coarse = levels[l + 1];
+    for (std::size_t l = grids.size() - 1; l-- > 0;) {
+        BlockGrid &fine = grids[l], &coarse = grids[l + 1];
         for (int row = 0; row < fine.rows; ++row)
             for (int col = 0; col < fine.columns; ++col) {
                 if (fine.weight(col, row) > 0) continue;
@@ -106,9 +106,9 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
                 }
             }
     }
-    columns_ = levels[0].columns;
-    rows_ = levels[0].rows;
-    blocks_ = std::move(levels[0].sums);
+    columns_ = grids[0].columns;
+    rows_ = grids[0].rows;
+    blocks_ = std::move(grids[0].sums);
 }
 
 double GapField::at(double x, double y, std::vector<float>& values) const {

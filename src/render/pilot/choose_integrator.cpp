@@ -9,7 +9,7 @@
 namespace vlx::render {
 namespace {
 
-constexpr int kSide = 24;  ///< of the pilot's picture at most
+constexpr int kLongerSide = 24;  ///< of the pilot's picture at most
 constexpr int kRounds = 16;
 /// Samples of the picture from which on a pilot, about 0.4 s, is worth it.
 constexpr double kLeastSamples = 2e5;
@@ -23,7 +23,8 @@ struct SmallPicture {
     explicit SmallPicture(const RenderOptions& options) {
         const Window whole{0, 0, options.width, options.height};
         const Window part = options.crop.value_or(whole);
-        const double scale = std::min(1.0, static_cast<double>(kSide) / std::max(part.width, part.height));
+        const double scale =
+            std::min(1.0, static_cast<double>(kLongerSide) / std::max(part.width, part.height));
         const auto scaled = [scale](int v) { return static_cast<int>(std::lround(v * scale)); };
         width = std::max(1, scaled(options.width));
         height = std::max(1, scaled(options.height));

@@ -15,8 +15,8 @@
 namespace vlx::render {
 namespace {
 
-constexpr int kSide = 24;    ///< of the grid of pixels
-constexpr int kSamples = 2;  ///< of each
+constexpr int kGridSide = 24;  ///< of the grid of pixels
+constexpr int kSamples = 2;    ///< of each
 constexpr int kRuns = 3;
 
 double threadSeconds() {
@@ -68,11 +68,11 @@ struct Variant {
     double run(const RenderOptions& options) const {
         std::vector<Splat> splats;
         const double start = threadSeconds();
-        for (int i = 0; i < kSide * kSide; ++i) {
+        for (int i = 0; i < kGridSide * kGridSide; ++i) {
             const float x =
-                (static_cast<float>(i % kSide) + 0.5f) / kSide * static_cast<float>(options.width);
+                (static_cast<float>(i % kGridSide) + 0.5f) / kGridSide * static_cast<float>(options.width);
             const float y =
-                (static_cast<float>(i / kSide) + 0.5f) / kSide * static_cast<float>(options.height);
+                (static_cast<float>(i / kGridSide) + 0.5f) / kGridSide * static_cast<float>(options.height);
             for (std::uint32_t s = 0; s < kSamples; ++s) {
                 CameraSample sample;
                 sample.x = x;

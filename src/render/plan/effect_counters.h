@@ -2,6 +2,9 @@
 
 #include "render/plan/effect_set.h"
 
+#ifdef VARIOLUX_COUNTS_NOTHING
+#error "a source of vlx_render_uncounted includes what counts: move it to vlx_render (CMakeLists.txt)"
+#endif
 #ifdef VARIOLUX_COUNT_EFFECTS
 #include <atomic>
 #endif
