@@ -17,7 +17,6 @@ constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this man
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
 // than their prefilter says. Twice the standard deviation.
 constexpr double kFeatureErrorFactor = 4;
-constexpr float kLeastSquare = 1e-30f;  // of radiance, or of its noise
 constexpr int kPriorIterations = 4;
 
 int lanesUp(int n) { return (n + 7) & ~7; }

@@ -9,8 +9,9 @@
 /// Kriging with external drift in one neighbourhood: METHOD.md 7.2 to 7.4.
 namespace vlx {
 
-inline constexpr int kPositionFunctions = 5;  ///< x, y, x^2, y^2, xy
-inline constexpr float kFarthest = 3.6f;      ///< composite distance: data farther away weigh nothing
+inline constexpr int kPositionFunctions = 5;   ///< x, y, x^2, y^2, xy
+inline constexpr float kFarthest = 3.6f;       ///< composite distance: data farther away weigh nothing
+inline constexpr float kLeastSquare = 1e-30f;  ///< of radiance, or of its noise
 inline constexpr float kFeatureWidth2 =
     0.04f;  ///< (a fifth of a feature's scale)^2: as unlike as noise of one
 

@@ -13,9 +13,9 @@ namespace vlx {
 
 namespace {
 
-constexpr double kKnown = 4;  // (standard errors of lost light that are none)^2
-constexpr int kBlock = 16;    // columns
-constexpr int kWide = 256;    // columns: the first of the wide scales
+constexpr double kKnown = 4;       // (standard errors of lost light that are none)^2
+constexpr int kLightColumns = 16;  // columns
+constexpr int kWide = 256;         // columns: the first of the wide scales
 
 /// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
 double coverage(double alpha) {
@@ -207,10 +207,10 @@ void Finishing::widen(const std::vector<double>& around, std::vector<double>& sh
     struct Light {
         double left[3] = {}, light[3] = {}, noise = 0, share[3] = {}, shareOfAll = 0;
     };
-    const int blocks = (width_ + kBlock - 1) / kBlock;
+    const int blocks = (width_ + kLightColumns - 1) / kLightColumns;
     std::vector<Light> row(static_cast<std::size_t>(blocks));
     for (std::size_t i = 0; i < w; ++i) {
-        Light& block = row[i / kBlock];
+        Light& block = row[i / kLightColumns];
         for (std::size_t c = 0; c < 3; ++c) {
             const int colour = static_cast<int>(c);
             const double light = plane(LightPlanes::light(colour))[i];
@@ -220,7 +220,7 @@ void Finishing::widen(const std::vector<double>& around, std::vector<double>& sh
         }
         block.noise += plane(LightPlanes::kNoise)[i];
     }
-    for (int reach = kWide / kBlock;; reach *= 4) {
+    for (int reach = kWide / kLightColumns;; reach *= 4) {
         std::vector<Light> next = row;
         for (int b = 0; b < blocks; ++b) {
             Light sum;
@@ -253,7 +253,7 @@ void Finishing::widen(const std::vector<double>& around, std::vector<double>& sh
         if (reach >= blocks) break;
     }
     for (int x = 0; x < width_; ++x) {
-        const double at = std::clamp((x + 0.5) / kBlock - 0.5, 0.0, blocks - 1.0);
+        const double at = std::clamp((x + 0.5) / kLightColumns - 0.5, 0.0, blocks - 1.0);
         const auto b = static_cast<std::size_t>(at);
         const Light &here = row[b], &there = row[std::min(b + 1, row.size() - 1)];
         const double part = at - static_cast<double>(b);

@@ -12,7 +12,6 @@ namespace {
 constexpr float kLeastWeight = 0.01f;      // of a datum: nearExp(kFarthest)
 constexpr float kCoveringWeight = 0.2f;    // a pixel less like its regular centres gets its own
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
-constexpr float kLeastSquare = 1e-30f;     // of radiance, or of its noise
 
 /// One tile's data with their margin, in local planes of kTileSide x kTileSide.
 class Tile {
