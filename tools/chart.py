@@ -8,8 +8,9 @@ COLOURS = ("#1b5fa8", "#b3322e", "#eda24f", "#4a9f62", "#777777")
 
 
 def decades(values):
-    """The powers of ten that enclose positive values."""
-    return math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
+    """The powers of ten that enclose positive values: two at least."""
+    low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
+    return low, max(high, low + 1)
 
 
 def power_ticks(low, high, step=1):

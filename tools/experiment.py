@@ -18,6 +18,8 @@ def _end(command, done):
 
 
 def _start(command):
+    if not os.access(command[0], os.X_OK) and os.sep in command[0]:
+        sys.exit(f"{os.path.relpath(sys.argv[0])}: expected a program, found no {command[0]} (--bin says where they are)")
     return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

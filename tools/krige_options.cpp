@@ -72,8 +72,6 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
               {{"keep", Fireflies::Keep}, {"robust", Fireflies::Robust}, {"clamp", Fireflies::Clamp}},
               "krige: samples far brighter than all around. keep: unbiased and noisy; robust: the brightest "
               "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
-              "What that takes is given back around, in proportion to the light there, as far as it is no "
-              "accident. "
               "What was removed is reported");
     app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
         ->check(finitePositive())

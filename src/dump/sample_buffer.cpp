@@ -17,6 +17,9 @@ SampleBuffer::SampleBuffer(DumpHeader header, SampleBand samples, std::string na
     const Window found{samples_.x, samples_.y, samples_.width, samples_.height};
     expect(header_.data.width > 0 && header_.data.height > 0,
            "expected a data window with pixels, found " + windowText(header_.data));
+    expect(header_.display.width > 0 && header_.display.height > 0,
+           "expected a display window (header.display: the whole picture) with pixels, found " +
+               windowText(header_.display));
     expect(found == header_.data, "expected the samples of the data window, " + windowText(header_.data) +
                                       ", found those of " + windowText(found));
     for (const char* channel : {"R", "G", "B"})

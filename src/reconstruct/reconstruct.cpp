@@ -5,6 +5,7 @@
 
 #include "reconstruct/common/bands.h"
 #include "reconstruct/common/methods.h"
+#include "variolux/base/error.h"
 #include "variolux/base/memory.h"
 
 namespace vlx {
@@ -40,6 +41,16 @@ ReconstructionReport reconstructGaussian(const SampleSource& source, const Gauss
 
 Image outline(const SampleSource& source, const Method& method) {
     if (const Drift* drift = std::get_if<Drift>(&method)) return driftOutline(source, *drift);
+    if (const Gaussian* gaussian = std::get_if<Gaussian>(&method))
+        if (const auto broken = gaussian->validate()) throw Error("", *broken);
+    if (const Paper* paper = std::get_if<Paper>(&method)) {
+        if (const auto broken = paper->validate()) throw Error("", *broken);
+        for (const auto& [x, y] : paper->inspect)
+            if (!source.header().data.contains(x, y))
+                throw Error(source.path(), "expected pixels to inspect within " +
+                                               windowText(source.header().data) + ", found (" +
+                                               std::to_string(x) + ", " + std::to_string(y) + ")");
+    }
     Image image;
     image.data = source.header().data;
     image.display = source.header().display;
@@ -52,6 +63,7 @@ Image outline(const SampleSource& source, const Method& method) {
 
 ReconstructionReport reconstruct(const SampleSource& source, const Method& method, const RowSink& sink,
                                  const Progress& progress) {
+    static_cast<void>(outline(source, method));  // throws when options are invalid
     struct Run {
         const SampleSource& source;
         const RowSink& sink;

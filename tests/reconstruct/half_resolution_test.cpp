@@ -157,7 +157,6 @@ class FinishingTest : public testing::Test {
     /// A pixel that is three times as bright as all others, `leverage` of it its own samples' mean.
     void addOutlier(float leverage, float variance) {
         for (int c = 0; c < 4; ++c) level_.combined.row(planes_.value() + c, 20)[20] *= 3;
-        for (int c = 0; c < 8; ++c) level_.data.row(data_.mean(0) + c, 20)[20] *= 3;
         level_.combined.row(planes_.leverage(), 20)[20] = leverage;
         for (int c = 0; c < 3; ++c) level_.set(level_.variances, c, variance);
     }
@@ -204,20 +203,6 @@ TEST_F(FinishingTest, LightThatManyPixelsLostComesBack) {
         EXPECT_NEAR(value(3, x, y), 0.55, 0.002) << x;  // a part of R by R's share
     }
     EXPECT_NEAR(returned_, 0.1 * 8 * kSide * kSide, 0.002 * 8 * kSide * kSide);
-}
-
-TEST_F(FinishingTest, LightThatTheEstimateLacksComesBack) {
-    for (int c = 0; c < 3; ++c) level_.set(level_.variances, c, 0.08f);  // of a mean 0.01
-    for (int c = 0; c < 4; ++c) level_.set(level_.data, data_.mean(0) + c, c == 3 ? 0.55f : 1.1f);
-    for (int c = 0; c < 4; ++c) level_.set(level_.data, data_.mean(1) + c, c == 3 ? 0.55f : 1.1f);
-    finish();
-    for (const auto& [x, y] : {std::pair{20, 20}, {0, 0}, {39, 5}}) {
-        EXPECT_NEAR(value(1, x, y), 1.1, 0.003) << x;  // 0.01 / 0.1^2 in 300 effective pixels at the corner
-        EXPECT_NEAR(value(3, x, y), 0.55, 0.0015) << x;
-    }
-    for (int c = 0; c < 3; ++c) level_.set(level_.variances, c, 80);  // noise may be all of it
-    finish();
-    EXPECT_NEAR(value(1, 20, 20), 1, 0.02);
 }
 
 TEST_F(FinishingTest, LightThatOnePixelLostIsNoKnowledge) {

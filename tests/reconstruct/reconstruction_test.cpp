@@ -9,6 +9,7 @@
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/reader.h"
+#include "variolux/dump/sample_buffer.h"
 #include "variolux/dump/writer.h"
 #include "variolux/reconstruct/reconstruct.h"
 
@@ -177,6 +178,41 @@ TEST(Report, IsJsonWithEveryRegion) {
     ASSERT_GE(layer, 0);
     EXPECT_FLOAT_EQ(result.image.at(5, 2)[layer], static_cast<float>(result.report.paper().regions[1].range));
     EXPECT_GE(result.image.channel("stddev.B"), 0);
+}
+
+TEST(Reconstruct, BadOptionsAreErrorsThatBothDoorsTell) {
+    DumpHeader header;
+    header.data = header.display = {0, 0, 2, 1};
+    header.channels = {{"R"}, {"G"}, {"B"}};
+    const SampleBuffer source(header, {0, 0, 2, 1, {0, 1, 2}, {"R", "G", "B"}, {{1, 2}, {1, 2}, {1, 2}}});
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const Method& method :
+         {Method(Gaussian{0}), Method(Gaussian{nan}), Method(Paper{.regionSize = 65}),
+          Method(Paper{.inspect = {{2, 0}}}), Method(Drift{.strength = -1}), Method(Drift{.scale = 9}),
+          Method(Drift{.fireflies = Fireflies::Clamp, .clamp = 0})}) {
+        EXPECT_THROW(outline(source, method), Error) << method.index();
+        EXPECT_THROW(reconstruct(source, method), Error) << method.index();
+    }
+    header.display = {};
+    EXPECT_THROW(SampleBuffer(header, source.read(0, 1, {})), Error);
+}
+
+TEST(Reconstruct, RowsAndTheWholeAreTheSame) {
+    const SampleBand band = makeBand({0, 0, 9, 7}, 4, [](int column, int row, int i) {
+        return MadeSample{0.1f * static_cast<float>(column + i), 0.2f * static_cast<float>(row), 0.3f,
+                          stratumX(column, i), stratumY(row, i)};
+    });
+    const SampleBuffer source(headerFor(band), band);
+    for (const Method& method : {Method(Drift{}), Method(Paper{}), Method(Mean{}), Method(Gaussian{1.5})}) {
+        const Image whole = reconstruct(source, method).image, like = outline(source, method);
+        EXPECT_EQ(whole.channels, like.channels);
+        EXPECT_EQ(whole.data, like.data);
+        std::vector<float> rows;
+        reconstruct(source, method, [&](const float* values, int count) {
+            rows.insert(rows.end(), values, values + count * whole.data.width * whole.channelCount());
+        });
+        EXPECT_EQ(rows, whole.pixels) << method.index();
+    }
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ struct DumpHeader {
     std::map<std::string, std::string> extra;  ///< other text attributes, kept from and to the file
 };
 
-/// The channels of DESIGN's dump table that Variolux gives meaning to, in its order:
+/// The channels of FORMAT.md that Variolux gives meaning to, in its order:
 /// R G B A Z sample.x sample.y albedo.R albedo.G albedo.B N.X N.Y N.Z sample.replicate, with their stored
 /// types.
 const std::vector<DumpChannel>& standardChannels();

@@ -43,9 +43,7 @@
 ///    than 32 pixels along an axis have no such level.
 /// 7. *Outliers and light*: a pixel beyond the range of its eight neighbours moves towards them by the share
 ///    of the excess that its own noise explains. What fireflies lost in the 33 x 33 pixels around is given
-///    back in proportion to the light there, as far as it is beyond two standard errors; what is left of it,
-///    and what the estimate differs from the samples by, over the same rows and 513 columns or more, as far
-///    as noise does not explain it (finishing.h): the image's mean stays the samples'.
+///    back in proportion to the light there, as far as it is beyond two standard errors (finishing.h).
 /// 8. *Error map*: the estimator's own variance. The noise of the halves' common data is estimated twice, and
 ///    half of each taken: by what the halves' combinations differ in, (A - B)^2 / 4 over 5 x 5 pixels of
 ///    alike features; and by the kriging variance of the neighbourhoods, v (1 + p) / sum w (p effective
@@ -85,7 +83,7 @@ enum class Fireflies {
     Robust,  ///< the brightest sample of the 5 x 5 pixels of the dump around it, if there are 9 or more,
              ///< counts as bright as the second brightest (a Winsorised mean: of 25 n samples one, so the
              ///< bias vanishes as n grows); where many lose light it is given back to their surroundings
-    Clamp,  ///< samples above a given luminance are scaled down to it; what that takes is given back likewise
+    Clamp,   ///< samples above a given luminance are scaled down to it: a bias that stays
 };
 
 /// The method's options. With a scale above 1 the samples are sorted into parts of their pixels by their

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 
 #include "variolux/base/image.h"
 
@@ -28,7 +30,10 @@ GaussianResult gaussianFilter(const Image& image, double sigma);
 /// As a method: the average (mean.h), filtered. A pixel without samples has no part in its neighbours. The
 /// error of a filtered pixel is mostly bias, which this filter cannot know: no layer stddev.
 struct Gaussian {
-    double sigma = 1;  ///< pixels
+    double sigma = 1;  ///< pixels; > 0, finite
+
+    /// The broken constraint in words, or nothing.
+    std::optional<std::string> validate() const;
 };
 
 }  // namespace vlx

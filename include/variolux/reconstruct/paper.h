@@ -20,7 +20,8 @@ struct Paper {
     int regionSize = 4;
     /// Join the distance in colour space with the distance on the image plane.
     bool colourDistance = true;
-    /// Raster coordinates (x, y) of pixels whose regions are to be inspected (PaperReport::inspections).
+    /// Raster coordinates (x, y) of pixels of the data window whose regions are to be inspected
+    /// (PaperReport::inspections).
     std::vector<std::pair<int, int>> inspect = {};
 
     /// The broken constraint in words, or nothing.

@@ -61,7 +61,7 @@ struct DriftReport {
     std::int64_t exactPixels = 0;           ///< the dump states an error of 0: kept as they are
     std::int64_t limitedSamples = 0;        ///< made darker by the firefly estimator
     double energyRemoved = 0;               ///< share of all samples' luminance that this took away
-    double energyReturned = 0;              ///< and that was given back (METHOD.md 7.7)
+    double energyReturned = 0;              ///< and that was given back around them
     std::int64_t neighbourhoods = 0;        ///< kriged, over models and halves
     std::int64_t ownNeighbourhoods = 0;     ///< centred on pixels unlike their regular centres
     std::int64_t failedNeighbourhoods = 0;  ///< not solvable: their weighted mean

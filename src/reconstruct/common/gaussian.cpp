@@ -7,6 +7,7 @@
 
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -29,9 +30,13 @@ void addScaled(double* target, const double* source, double weight, std::int64_t
 
 }  // namespace
 
+std::optional<std::string> Gaussian::validate() const {
+    if (sigma > 0 && std::isfinite(sigma)) return std::nullopt;
+    return "expected a sigma above 0 pixels, found " + formatted("%g", sigma);
+}
+
 GaussianResult gaussianFilter(const Image& image, double sigma) {
-    if (!(sigma > 0) || !std::isfinite(sigma))
-        throw Error("sigma", "expected a positive number of pixels, found " + std::to_string(sigma));
+    if (const auto broken = Gaussian{sigma}.validate()) throw Error("", *broken);
 
     GaussianResult result;
     result.image = image;

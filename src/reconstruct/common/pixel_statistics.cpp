@@ -217,7 +217,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
 
         std::fill(square.begin(), square.end(), 0.0);
         for (auto& s : sum) s.assign(radiance + features, 0.0);
-        double rgb[3] = {}, clamped[3] = {};
+        double rgb[3] = {};
         std::size_t bright = 0;
         float most = -1, second = -1;
         int brightHalf = 0;
@@ -236,7 +236,6 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
                 counts.luminance += brightness;
                 counts.removed += brightness * (1 - factor);
                 counts.limited += factor < 1;
-                for (int c = 0; c < 3; ++c) clamped[c] += rgb[c] * (1 - factor);
                 for (std::size_t c = 0; c < radiance + features; ++c) {
                     const double d = value(c, s) * (c < radiance && c != alpha ? factor : 1) - first[c];
                     sum[half][c] += d;
@@ -282,7 +281,6 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         put(planes.brightestLuminance(), std::max(0.f, most));
         put(planes.secondLuminance(), std::max(0.f, second));
         put(planes.brightestHalf(), brightHalf);
-        for (int c = 0; c < 3; ++c) put(planes.clamped() + c, n > 0 ? clamped[c] / n : 0);
     }
     return counts;
 }

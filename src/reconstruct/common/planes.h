@@ -24,8 +24,7 @@ struct GatheredPlanes {
     int brightestLuminance() const { return brightest() + radiance; }
     int secondLuminance() const { return brightest() + radiance + 1; }
     int brightestHalf() const { return brightest() + radiance + 2; }
-    int clamped() const { return brightest() + radiance + 3; }  ///< R, G, B: taken off the mean by a clamp
-    int channels() const { return brightest() + radiance + 6; }
+    int channels() const { return brightest() + radiance + 3; }
 };
 
 /// What is kriged: means of the halves.
@@ -124,14 +123,9 @@ struct DifferencePlanes {
     int channels() const { return radiance + 8; }
 };
 
-/// Light that a pixel's estimate lacks, and light that it has.
+/// Light that fireflies lost, and light that is there, summed along a row.
 struct LightPlanes {
-    static constexpr int lost(int c) { return c; }       ///< R, G, B taken off as a firefly's
-    static constexpr int kLostSquare = 3;                ///< summed over R, G, B
-    static constexpr int apart(int c) { return 4 + c; }  ///< R, G, B of the samples' mean less the estimate
-    static constexpr int kNoise = 7;  ///< variance of `lost` and `apart`, summed over R, G, B
-    static constexpr int light(int c) { return 8 + c; }  ///< R, G, B of the estimate
-    static constexpr int kChannels = 11;
+    static constexpr int kChannels = 7;  ///< lost of R, G, B; its square; R, G, B
 };
 
 /// Mean of all samples of a pixel; 0 where it has none.

@@ -13,9 +13,7 @@ namespace vlx {
 
 namespace {
 
-constexpr double kKnown = 4;       // (standard errors of lost light that are none)^2
-constexpr int kLightColumns = 16;  // columns
-constexpr int kWide = 256;         // columns: the first of the wide scales
+constexpr double kKnown = 4;  // (standard errors of lost light that are none)^2
 
 /// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
 double coverage(double alpha) {
@@ -131,137 +129,59 @@ void Finishing::cleanRow(int y) {
 }
 
 void Finishing::lightRow(int y) {
-    const float* const counts = data_.row(planes_.count(), y);
-    for (int x = 0; x < width_; ++x) {
-        double square = 0, noise = 0;
-        for (int c = 0; c < 3; ++c) {
-            const double lost = data_.row(planes_.removed() + c, y)[x], value = clean_.row(c, y)[x];
-            square += lost * lost;
-            const bool datum = counts[x] > 0;
-            if (datum) noise += static_cast<double>(variances_.row(c, y)[x] / counts[x]);
-            light_.row(LightPlanes::lost(c), y)[x] = static_cast<float>(lost);
-            light_.row(LightPlanes::apart(c), y)[x] =
-                datum ? static_cast<float>(plainMean(data_, planes_, c, x, y) - value) : 0;
-            light_.row(LightPlanes::light(c), y)[x] = static_cast<float>(std::max(0.0, value));
-        }
-        light_.row(LightPlanes::kLostSquare, y)[x] = static_cast<float>(square);
-        light_.row(LightPlanes::kNoise, y)[x] = static_cast<float>(square + noise);
-    }
-}
-
-/// LightPlanes of the rows around y, under lightWeight(): variances by the square of it.
-std::vector<double> Finishing::lightAround(int y) const {
     const auto w = static_cast<std::size_t>(width_);
-    std::vector<double> sums(LightPlanes::kChannels * w);
-    for (int row = std::max(0, y - kLightReach); row <= std::min(height_ - 1, y + kLightReach); ++row)
-        for (int k = 0; k < LightPlanes::kChannels; ++k) {
-            const double weight = lightWeight(row - y);
-            const bool variance = k == LightPlanes::kLostSquare || k == LightPlanes::kNoise;
-            const double by = variance ? weight * weight : weight;
-            const float* in = light_.row(k, row);
-            double* sum = sums.data() + static_cast<std::size_t>(k) * w;
-            for (std::size_t i = 0; i < w; ++i) sum[i] += by * static_cast<double>(in[i]);
+    std::vector<double> in(LightPlanes::kChannels * w);
+    for (std::size_t i = 0; i < w; ++i)
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double lost = data_.row(planes_.removed() + static_cast<int>(c), y)[i];
+            in[c * w + i] = lost;
+            in[3 * w + i] += lost * lost;
+            in[(4 + c) * w + i] = std::max(0.f, clean_.row(static_cast<int>(c), y)[i]);
         }
-    return sums;
+    for (int k = 0; k < LightPlanes::kChannels; ++k)
+        for (int x = 0; x < width_; ++x) {
+            double sum = 0;
+            for (int col = std::max(0, x - kLightReach); col <= std::min(width_ - 1, x + kLightReach);
+                 ++col) {
+                const double weight = lightWeight(col - x);
+                sum += (k == 3 ? weight * weight : weight) *
+                       in[static_cast<std::size_t>(k) * w + static_cast<std::size_t>(col)];
+            }
+            light_.row(k, y)[x] = static_cast<float>(sum);
+        }
 }
 
-/// By what share R, G, B and all of them grow, pixel by pixel of row y, so that the light that the estimate
-/// lacks is given back in proportion to the light that is there, at the scale at which it is known. First
-/// what fireflies lost in kLightReach columns around, by (1 - 4 sum r^2 / |sum r|^2)+: nothing within two
-/// standard errors. Last, the variance of what was lost, sum r^2, as a share of the light's square.
+/// By what share R, G, B and all of them grow, pixel by pixel of row y, so that what fireflies lost around is
+/// given back in proportion to the light there, by how much of it is no accident of a few samples:
+/// (1 - 4 sum r^2 / (sum r)^2)+, nothing within two standard errors. Last, the variance of what was lost, sum
+/// r^2, as a share of the light's square.
 std::vector<double> Finishing::returned(int y) const {
     const auto w = static_cast<std::size_t>(width_);
-    const std::vector<double> around = lightAround(y);
-    const auto plane = [&](int k) { return around.data() + static_cast<std::size_t>(k) * w; };
-    std::vector<double> shares(5 * w);
-    for (int x = 0; x < width_; ++x) {
-        double lost[3] = {}, light[3] = {}, squares = 0;
-        for (int col = std::max(0, x - kLightReach); col <= std::min(width_ - 1, x + kLightReach); ++col) {
-            const double weight = lightWeight(col - x);
-            for (int c = 0; c < 3; ++c) {
-                lost[c] += weight * plane(LightPlanes::lost(c))[col];
-                light[c] += weight * plane(LightPlanes::light(c))[col];
-            }
-            squares += weight * weight * plane(LightPlanes::kLostSquare)[col];
+    std::vector<double> sums(LightPlanes::kChannels * w), shares(5 * w);
+    for (int row = std::max(0, y - kLightReach); row <= std::min(height_ - 1, y + kLightReach); ++row) {
+        const double weight = lightWeight(row - y);
+        for (int k = 0; k < LightPlanes::kChannels; ++k) {
+            const float* in = light_.row(k, row);
+            double* sum = sums.data() + static_cast<std::size_t>(k) * w;
+            for (std::size_t i = 0; i < w; ++i) sum[i] += (k == 3 ? weight * weight : weight) * in[i];
         }
-        const auto i = static_cast<std::size_t>(x);
-        const double all = light[0] + light[1] + light[2];
-        if (all <= 0) continue;
-        const double square = lost[0] * lost[0] + lost[1] * lost[1] + lost[2] * lost[2];
-        const double known = shrinkage(square, kKnown * squares);
-        for (std::size_t c = 0; c < 3; ++c)
-            if (light[c] > 0) shares[c * w + i] = known * lost[c] / light[c];
-        shares[3 * w + i] = known * (lost[0] + lost[1] + lost[2]) / all;
-        shares[4 * w + i] = 3 * squares / (all * all);
     }
-    widen(around, shares);
-    return shares;
-}
-
-/// What is not given back yet, of what fireflies lost and what the estimate differs from the samples by: at
-/// wider and wider scales along the row, (1 - variance / square)+ of what the one before left, in blocks of
-/// columns, linear between them.
-void Finishing::widen(const std::vector<double>& around, std::vector<double>& shares) const {
-    const auto w = static_cast<std::size_t>(width_);
-    const auto plane = [&](int k) { return around.data() + static_cast<std::size_t>(k) * w; };
-    struct Light {
-        double left[3] = {}, light[3] = {}, noise = 0, share[3] = {}, shareOfAll = 0;
-    };
-    const int blocks = (width_ + kLightColumns - 1) / kLightColumns;
-    std::vector<Light> row(static_cast<std::size_t>(blocks));
     for (std::size_t i = 0; i < w; ++i) {
-        Light& block = row[i / kLightColumns];
+        double square = 0, lost = 0, light = 0;
         for (std::size_t c = 0; c < 3; ++c) {
-            const int colour = static_cast<int>(c);
-            const double light = plane(LightPlanes::light(colour))[i];
-            block.left[c] += plane(LightPlanes::lost(colour))[i] + plane(LightPlanes::apart(colour))[i] -
-                             shares[c * w + i] * light;
-            block.light[c] += light;
+            square += sums[c * w + i] * sums[c * w + i];
+            lost += sums[c * w + i];
+            light += sums[(4 + c) * w + i];
         }
-        block.noise += plane(LightPlanes::kNoise)[i];
-    }
-    for (int reach = kWide / kLightColumns;; reach *= 4) {
-        std::vector<Light> next = row;
-        for (int b = 0; b < blocks; ++b) {
-            Light sum;
-            for (int k = std::max(0, b - reach); k <= std::min(blocks - 1, b + reach); ++k) {
-                const double u = static_cast<double>(k - b) / (reach + 1), weight = (1 - u * u) * (1 - u * u);
-                const Light& at = row[static_cast<std::size_t>(k)];
-                for (int c = 0; c < 3; ++c) {
-                    sum.left[c] += weight * at.left[c];
-                    sum.light[c] += weight * at.light[c];
-                }
-                sum.noise += weight * weight * at.noise;
-            }
-            const double all = sum.light[0] + sum.light[1] + sum.light[2];
-            if (all <= 0) continue;
-            double square = 0, left = 0;
-            for (const double of : sum.left) {
-                square += of * of;
-                left += of;
-            }
-            const double known = shrinkage(square, sum.noise);
-            Light& to = next[static_cast<std::size_t>(b)];
-            for (int c = 0; c < 3; ++c) {
-                const double share = sum.light[c] > 0 ? known * sum.left[c] / sum.light[c] : 0;
-                to.share[c] += share;
-                to.left[c] -= share * to.light[c];
-            }
-            to.shareOfAll += known * left / all;
-        }
-        row = std::move(next);
-        if (reach >= blocks) break;
-    }
-    for (int x = 0; x < width_; ++x) {
-        const double at = std::clamp((x + 0.5) / kLightColumns - 0.5, 0.0, blocks - 1.0);
-        const auto b = static_cast<std::size_t>(at);
-        const Light &here = row[b], &there = row[std::min(b + 1, row.size() - 1)];
-        const double part = at - static_cast<double>(b);
-        const auto i = static_cast<std::size_t>(x);
+        const double known = shrinkage(square, kKnown * sums[3 * w + i]);
         for (std::size_t c = 0; c < 3; ++c)
-            shares[c * w + i] += here.share[c] + part * (there.share[c] - here.share[c]);
-        shares[3 * w + i] += here.shareOfAll + part * (there.shareOfAll - here.shareOfAll);
+            if (sums[(4 + c) * w + i] > 0)
+                shares[c * w + i] = known * sums[c * w + i] / sums[(4 + c) * w + i];
+        if (light <= 0) continue;
+        shares[3 * w + i] = known * lost / light;
+        shares[4 * w + i] = 3 * sums[3 * w + i] / (light * light);
     }
+    return shares;
 }
 
 Finishing::Counts Finishing::outputRow(int y, float* out) const {
@@ -288,7 +208,8 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             } else {
                 const int colour = colour_[static_cast<std::size_t>(c)];
                 const double more =
-                    value * shares[static_cast<std::size_t>((colour < 0 ? 3 : colour) * width_ + x)];
+                    std::max(0.0, value) *  // as where the shares come from: what is negative is no light
+                    shares[static_cast<std::size_t>((colour < 0 ? 3 : colour) * width_ + x)];
                 value += more;
                 if (c < 3 && !exact) back[c] = strength * more;
                 if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0) value = std::max(0.0, value);

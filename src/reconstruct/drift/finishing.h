@@ -26,7 +26,7 @@ class Finishing {
     /// the variance of a sample, or the mean of it over 3 x 3 pixels. All channels move by the same weight,
     /// along the line to the neighbour nearest to the range's border. Combined rows y - 1 to y + 1 are there.
     void cleanRow(int y);
-    /// Row y of `light`. Clean row y is there.
+    /// Row y of `light`, weighted sums along the row. Clean row y is there.
     void lightRow(int y);
     struct Counts {
         std::int64_t exact = 0;  ///< pixels
@@ -41,9 +41,7 @@ class Finishing {
     bool isExact(int x, int y) const;
     float likeness(int x, int y, int col, int row) const;
     void sharedVariance(int x, int y, double* variance) const;
-    std::vector<double> lightAround(int y) const;
     std::vector<double> returned(int y) const;
-    void widen(const std::vector<double>& around, std::vector<double>& shares) const;
 
     const SampleLayout& layout_;
     DataPlanes planes_;

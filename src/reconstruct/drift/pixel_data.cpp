@@ -102,7 +102,7 @@ void PixelData::limitPixel(int x, int y, LimitedRow& row) {
     float squares[3];
     for (int c = 0; c < 3; ++c) squares[c] = raw(planes_.squares() + c);
 
-    for (int c = 0; c < 3; ++c) out_.data.row(dataPlanes_.removed() + c, y)[x] = raw(planes_.clamped() + c);
+    for (int c = 0; c < 3; ++c) out_.data.row(dataPlanes_.removed() + c, y)[x] = 0;
     const float brightest = raw(planes_.brightestLuminance());
     const bool exact = raw(planes_.stated()) > 0 && squares[0] + squares[1] + squares[2] == 0;
     if (robust_ && brightest > 0 && !exact) {

@@ -68,7 +68,6 @@ std::optional<std::string> Paper::validate() const {
 
 ReconstructionReport reconstructPaper(const SampleSource& dump, const Paper& method, const RowSink& sink,
                                       const Progress& progress) {
-    if (const auto broken = method.validate()) throw Error("", *broken);
     const DumpHeader& header = dump.header();
     const ChannelChoice channels = chooseChannels(header);
     const int radiance = channels.radianceCount();
