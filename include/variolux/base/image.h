@@ -39,6 +39,7 @@ struct Image {
         Image result(data, names);
         result.display = display;
         std::vector<int> from;
+        from.reserve(names.size());
         for (const std::string& name : names) from.push_back(channel(name));
         const std::size_t count = channels.size();
         auto out = result.pixels.begin();
