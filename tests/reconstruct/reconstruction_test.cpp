@@ -192,6 +192,7 @@ TEST(Reconstruct, BadOptionsAreErrorsThatBothDoorsTell) {
           Method(Drift{.fireflies = Fireflies::Clamp, .clamp = 0})}) {
         EXPECT_THROW(outline(source, method), Error) << method.index();
         EXPECT_THROW(reconstruct(source, method), Error) << method.index();
+        EXPECT_THROW(reconstruct(source, method, [](const float*, int) {}), Error) << method.index();
     }
     header.display = {};
     EXPECT_THROW(SampleBuffer(header, source.read(0, 1, {})), Error);

@@ -2,7 +2,8 @@
 
 #include "variolux/reconstruct/reconstruct.h"
 
-/// The methods behind the door: each gives its rows to the sink as reconstruct() says.
+/// The methods behind the door, which has checked their options (outline()): each gives its rows to the sink
+/// as reconstruct() says.
 namespace vlx {
 
 inline constexpr const char* kStddevChannels[] = {"stddev.R", "stddev.G", "stddev.B"};

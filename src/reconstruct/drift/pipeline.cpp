@@ -372,7 +372,6 @@ Image driftOutline(const SampleSource& dump, const Drift& options) {
 
 ReconstructionReport reconstructDrift(const SampleSource& dump, const Drift& options, const RowSink& sink,
                                       const Progress& progress) {
-    check(dump, options);
     return Pipeline(dump, options, sink, progress).run();
 }
 
