@@ -149,6 +149,17 @@ void setFormatter(CLI::App& app, const std::shared_ptr<CLI::FormatterBase>& form
         setFormatter(*command, formatter);
 }
 
+// Lines of both would mix on standard output.
+void checkOneOwnerOfOutput(CLI::App& app, LogFormat format) {
+    if (format != LogFormat::OpenJd) return;
+    for (CLI::App* const command : allOf(app)) {
+        const CLI::Option* json = command->get_option_no_throw("--json");
+        if (command->parsed() && json != nullptr && json->count() > 0)
+            throw CLI::ValidationError("--json",
+                                       "expected not with --log openjd: both write standard output; use --log json");
+    }
+}
+
 int runToEnd(int argc, char** argv, CLI::App& app, const std::function<int()>& run) {
     // A file size limit must end in an error message and a clean folder, like a full disk, not in a signal.
     std::signal(SIGXFSZ, SIG_IGN);
@@ -159,6 +170,7 @@ int runToEnd(int argc, char** argv, CLI::App& app, const std::function<int()>& r
     setFormatter(app, std::make_shared<HelpFormatter>());
     try {
         app.parse(argc, argv);
+        checkOneOwnerOfOutput(app, format);
         setLogFormat(format);
         hideProgressBars(quietAsked);
         const int code = run();

@@ -110,7 +110,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     std::optional<SampleMap> map;
     if (!o.mapPath.empty()) {
         const vlx::Window whole{0, 0, o.render.width, o.render.height};
-        o.render.map = &map.emplace(o.mapPath, o.render.crop.value_or(whole));
+        o.render.map = &map.emplace(o.mapPath, whole, o.render.crop.value_or(whole));
     }
     const Plan plan = planEffects(
         loaded, {o.render.camera, o.render.width, o.render.height, o.render.path.maxBounces, *request});

@@ -71,17 +71,17 @@ void Fingerprint::checkUnchanged() const {
 }
 
 std::string Fingerprint::text(const Band& band) const {
-    std::string all = digest(folded_);
-    if (band.count > 1) {
-        all += kBand;
-        all += std::to_string(band.index + 1) + "/" + std::to_string(band.count);
-    }
-    return all;
+    return inputsOfBand(digest(folded_), band);
 }
 
 std::string fileFingerprint(const std::string& path) {
     if (const auto found = digestOfFile(path)) return *found;
     throw Error(path, "expected a file that can be read");
+}
+
+std::string inputsOfBand(const std::string& whole, const Band& band) {
+    if (band.count <= 1) return whole;
+    return whole + std::string(kBand) + std::to_string(band.index + 1) + "/" + std::to_string(band.count);
 }
 
 std::optional<std::string> wholeOfBand(const std::string& inputs) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <set>
 
 #include "dump/exr_header.h"
 #include "edit/band_rows.h"
@@ -155,8 +156,10 @@ std::string inputsOf(const std::string& part) {
 std::string wholeInputs(const std::vector<std::string>& parts) {
     std::string run, runOf;  // of the bands, and the first of them
     bool allBands = true;
+    std::set<std::string> bands;
     for (const std::string& part : parts) {
         const std::string inputs = inputsOf(part);
+        bands.insert(inputs);
         const auto found = wholeOfBand(inputs);
         if (!found) {
             allBands = false;
@@ -170,7 +173,11 @@ std::string wholeInputs(const std::vector<std::string>& parts) {
             throw Error(part, "expected a band of the run " + run + " as " + runOf + " is, found one of " +
                                   *found + ": other inputs or parameters");
     }
-    return allBands ? run : std::string();
+    if (!allBands) return {};
+    const int count = static_cast<int>(parts.size());
+    for (int i = 0; i < count; ++i)
+        if (!bands.contains(inputsOfBand(run, {i, count}))) return {};
+    return run;
 }
 
 MergeReport mergeParts(const std::vector<std::string>& parts, const std::string& output,

@@ -60,6 +60,8 @@ TEST(Fingerprint, NoticesFilesThatChangeMeanwhile) {
 TEST(Fingerprint, OfABandSaysWhichWholeItBelongsTo) {
     const Fingerprint made = Fingerprint().add("spp", "16");
     EXPECT_EQ(made.text({1, 5}), made.text() + " band 2/5");
+    EXPECT_EQ(made.text({1, 5}), inputsOfBand(made.text(), {1, 5}));
+    EXPECT_EQ(made.text(), inputsOfBand(made.text(), {}));
     EXPECT_EQ(wholeOfBand(made.text({1, 5})), made.text());
     EXPECT_EQ(wholeOfBand(made.text()), std::nullopt);
     EXPECT_EQ(wholeOfBand(""), std::nullopt);

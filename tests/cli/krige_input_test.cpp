@@ -107,6 +107,7 @@ TEST_F(Input, OptionsThatTheMethodDoesNotReadAreBadUsage) {
     ends({kDump, "--clamp", "3"}, 2, "--clamp goes with --fireflies clamp");
     ends({kDump, "--method", "paper", "--inspect", "101,121"}, 2, "--inspect goes with --diagnostics");
     ends({kDump, "--template", kDump, "--drop-layers"}, 2, "--template");
+    ends({kDump, "--json", "--log", "openjd"}, 2, "both write standard output");
 }
 
 TEST_F(Input, OneFileUnderTwoNamesIsNoTwoOutputs) {

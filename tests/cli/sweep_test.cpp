@@ -231,16 +231,18 @@ TEST(VlxCompareSweep, FailingMethodIsShownFailing) {
         "1",          "--methods",
         "mean",       "--no-vary",
         "--external", "broken=echo no licence >&2; exit 4; {input} {output}",
+        "--external", "wrong=echo not expected: --regio >&2; echo Run --help >&2; exit 2; {input} {output}",
         "--external", "silent=true {input} {output}",
         "--external", "copy=cp {input} {output}"};
     const ToolRun run = sweep(arguments);
     EXPECT_EQ(run.exitCode, 1);
     EXPECT_NE(run.out.find("failed: exit code 4: no licence"), std::string::npos) << run.out;
+    EXPECT_NE(run.out.find("--regio"), std::string::npos) << run.out;
     EXPECT_NE(contentsOf(out + "/report.html").find("no licence"), std::string::npos);
     // Failures are tried again, the rest is not.
     const ToolRun again = sweep(arguments);
     EXPECT_EQ(again.exitCode, 1);
-    EXPECT_NE(again.out.find("2 of 5 results were there already"), std::string::npos) << again.out;
+    EXPECT_NE(again.out.find("2 of 6 results were there already"), std::string::npos) << again.out;
 }
 
 TEST(VlxCompareSweep, ReportedStagesAndPlacesOfAnExternalMethod) {

@@ -6,6 +6,7 @@
 
 #include "../base/temporary_folder.h"
 #include "../dump/test_dumps.h"
+#include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 #include "variolux/dump/reader.h"
 
@@ -178,6 +179,21 @@ TEST(Merge, FlatImagesKeepTypesWindowsAndAttributes) {
                   mergeParts({folder / "whole.exr", dumps.bands[0]}, folder / "m.exr");
               }).find("expected a flat image like"),
               std::string::npos);
+}
+
+// A run that is told what its inputs are may be skipped: only all bands are the whole.
+TEST(Merge, OnlyAllTheBandsOfARunAreTheWhole) {
+    Parts parts;
+    for (int i = 0; i < 4; ++i) {
+        TestDump part = partOf(parts.whole, bandOf(kWindow, {i, 4}));
+        part.header.extra[kInputsAttribute] = inputsOfBand("run", {i, 4});
+        writeDump(parts.bands[static_cast<std::size_t>(i)], part);
+    }
+    const std::vector<std::string>& b = parts.bands;
+    EXPECT_EQ(wholeInputs({b[2], b[0], b[3], b[1]}), "run");
+    EXPECT_EQ(wholeInputs({b[0], b[1], b[2]}), "");
+    EXPECT_EQ(wholeInputs({b[0], b[1], b[2], b[2]}), "");
+    EXPECT_EQ(wholeInputs({b[0], b[1], b[2], parts.tiles[0]}), "");
 }
 
 }  // namespace

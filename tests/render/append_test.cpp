@@ -101,7 +101,7 @@ TEST_F(Appending, NewSamplesAreAReplicateOfTheirOwn) {
 
 TEST_F(Appending, AMapSaysWhereTheSamplesGo) {
     map([](int x, int) { return x < 7 ? 0.f : x < 14 ? 1.f : 5.f; });
-    const SampleMap where(folder / "map.exr", {0, 0, 21, 18});
+    const SampleMap where(folder / "map.exr", {0, 0, 21, 18}, {0, 0, 21, 18});
     RenderOptions options = small();
     options.spp = 5;
     options.map = &where;
@@ -125,7 +125,7 @@ TEST_F(Appending, AMapSaysWhereTheSamplesGo) {
 // The samples that a band gets, where they depend on the whole picture: of a map, and added to a dump.
 TEST_F(Appending, BandsAreTheRowsOfTheWhole) {
     map([](int x, int y) { return static_cast<float>((x + 3 * y) % 5); });
-    const SampleMap map(folder / "map.exr", {0, 0, 21, 18});
+    const SampleMap map(folder / "map.exr", {0, 0, 21, 18}, {0, 0, 21, 18});
     RenderOptions options = small();
     options.replicates = 2;
     render("old.exr", options);
@@ -159,9 +159,9 @@ TEST_F(Appending, BandsAreTheRowsOfTheWhole) {
 
 TEST_F(Appending, BadMapsAndDumpsAreErrorsThatSayWhatWasFound) {
     const Window whole{0, 0, 21, 18};
-    const auto message = [&](const Window& window) -> std::string {
+    const auto message = [&](const Window& window, const Window& picture = {0, 0, 21, 18}) -> std::string {
         try {
-            const SampleMap m(folder / "map.exr", window);
+            const SampleMap m(folder / "map.exr", picture, window);
         } catch (const Error& e) {
             return e.what();
         }
@@ -174,6 +174,9 @@ TEST_F(Appending, BadMapsAndDumpsAreErrorsThatSayWhatWasFound) {
     map([](int, int) { return 1.f; }, "Y");
     EXPECT_EQ(message(whole), "no error");
     EXPECT_NE(message({0, 0, 22, 18}).find("expected 22 x 18"), std::string::npos) << message({0, 0, 22, 18});
+    EXPECT_EQ(message({2, 3, 4, 5}), "no error");
+    EXPECT_NE(message({0, 0, 4, 4}, {0, 0, 4, 4}).find("found one with 21 x 18"), std::string::npos)
+        << message({0, 0, 4, 4}, {0, 0, 4, 4});
     writeImage(folder / "map.exr", Image(whole, {"R", "G", "B"}));
     EXPECT_NE(message(whole).find("found R, G, B"), std::string::npos) << message(whole);
 

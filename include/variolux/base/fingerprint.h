@@ -41,7 +41,10 @@ class Fingerprint {
 /// The fingerprint of a file's contents alone. Throws Error when it is no file that can be read.
 std::string fileFingerprint(const std::string& path);
 
-/// Of Fingerprint::text() of a band, what the whole would say; nothing when it is not of a band.
+/// Of what Fingerprint::text() says of a whole, what it says of a band of it: "... band 2/5" of {1, 5}.
+std::string inputsOfBand(const std::string& whole, const Band& band);
+
+/// The reverse: what the whole would say; nothing when it is not of a band.
 std::optional<std::string> wholeOfBand(const std::string& inputs);
 
 /// Whether all `outputs` are there, and those that are images (.exr, .png) say that they are made of

@@ -89,8 +89,8 @@ enum class Fireflies {
 /// The method's options. With a scale above 1 the samples are sorted into parts of their pixels by their
 /// positions, and parts without samples are predicted; the windows grow by the scale. Memory depends on the
 /// picture's width, not its height. Every channel gets the same weights: parts that add up to R, G, B still
-/// do. A pixel without samples is predicted and counted; a sample with radiance that is not finite counts as
-/// left out. reconstruct() throws Error when options name channels that the dump lacks, ask for a scale where
+/// do. A pixel without samples is predicted and counted; a sample with radiance that is not finite, or beyond
+/// 2^50, is left out and counted. reconstruct() throws Error when options name channels that the dump lacks, ask for a scale where
 /// it has no positions or for more bands than rows, and when maxMemory is too little, saying what would do.
 struct Drift {
     Quality quality = Quality::Standard;

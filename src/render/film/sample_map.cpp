@@ -10,12 +10,15 @@
 
 namespace vlx::render {
 
-SampleMap::SampleMap(const std::string& path, const Window& window)
+SampleMap::SampleMap(const std::string& path, const Window& picture, const Window& window)
     : image_(readImage(path)), channel_(image_.channel("sampling.density")), pixels_(window.pixels()) {
     if (channel_ < 0) channel_ = image_.channel("Y");
     if (channel_ < 0 && image_.channelCount() == 1) channel_ = 0;
     if (channel_ < 0)
         throw Error(path, "expected a channel sampling.density or Y, found " + listed(image_.channels));
+    if (image_.display != picture)
+        throw Error(path, "expected densities of a picture with " + windowText(picture) +
+                              ", found one with " + windowText(image_.display));
     const Window& held = image_.data;
     const bool covers = window.x >= held.x && window.y >= held.y &&
                         window.x + window.width <= held.x + held.width &&

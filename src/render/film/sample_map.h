@@ -12,9 +12,9 @@ namespace vlx::render {
 class SampleMap {
   public:
     /// Reads the channel `sampling.density` of a flat image (or `Y`, or the only one). Throws Error when
-    /// there is none, when a value is negative or not finite, when the image does not cover `window`, and
-    /// when there is no density in it.
-    SampleMap(const std::string& path, const Window& window);
+    /// there is none, when a value is negative or not finite, when the image is of another picture (its
+    /// display window) or does not cover `window` of it, and when there is no density there.
+    SampleMap(const std::string& path, const Window& picture, const Window& window);
 
     /// Samples of a pixel when the mean over the window is to be `mean`: the density's share, rounded up or
     /// down at random, by `seed`, so that the expectation is exact.
