@@ -97,7 +97,12 @@ TEST_F(DriftKriging, BandsAreTheWholeImage) {
     picture.truth = [](int x, int y) { return 1 + 0.5 * std::sin(0.1 * y) + (x > 20); };
     write(picture.samples());
     const Reconstruction whole = krige();
-    for (const int count : {2, 5, 13}) {
+#ifdef VARIOLUX_SANITIZED
+    const std::vector<int> counts = {5};
+#else
+    const std::vector<int> counts = {2, 5, 13};
+#endif
+    for (const int count : counts) {
         int row = 0;
         std::int64_t samples = 0;
         for (int i = 0; i < count; ++i) {

@@ -130,7 +130,9 @@ TEST(Correction, WhereBothAreRightChangesNothing) { EXPECT_LT(correctedError(0, 
 class FinishingTest : public testing::Test {
   protected:
     FinishingTest()
-        : level_(kSide, 4), clean_(kSide, 4, kSide), light_(kSide, LightPlanes::kChannels, kSide) {
+        : level_(kSide, 4),
+          clean_(kSide, CleanPlanes{4}.channels(), kSide),
+          light_(kSide, LightPlanes::kChannels, kSide) {
         layout_.names = {"R", "G", "B", "key.R"};
         layout_.radiance = 4;
         for (int c = 0; c < 4; ++c) {
@@ -144,12 +146,15 @@ class FinishingTest : public testing::Test {
     void finish() {
         Finishing finishing(layout_, 1, 1, picture_, level_.rows(), level_.combined, clean_, light_);
         for (int y = 0; y < kSide; ++y) finishing.cleanRow(y);
-        for (int y = 0; y < kSide; ++y) finishing.lightRow(y);
+        for (int y = 0; y < kSide; ++y) finishing.errorRow(y);
         image_.resize(static_cast<std::size_t>(kSide) * kSide * 7);
-        returned_ = 0;
-        for (int y = 0; y < kSide; ++y)
-            returned_ +=
-                finishing.outputRow(y, image_.data() + static_cast<std::size_t>(y) * kSide * 7).returned;
+        counts_ = {};
+        for (int y = 0; y < kSide; ++y) {
+            const auto row = finishing.outputRow(y, image_.data() + static_cast<std::size_t>(y) * kSide * 7);
+            counts_.moved += row.moved;
+            counts_.samples += row.samples;
+            counts_.image += row.image;
+        }
     }
     float value(int c, int x, int y) const {
         return image_[static_cast<std::size_t>((y * kSide + x) * 7 + c)];
@@ -168,7 +173,7 @@ class FinishingTest : public testing::Test {
     MadeUpLevel level_;
     RowRing clean_, light_;
     std::vector<float> image_;
-    double returned_ = 0;
+    Finishing::Counts counts_;
 };
 
 TEST_F(FinishingTest, AnOutlierThatItsNoiseExplainsMovesToItsNeighbours) {
@@ -196,20 +201,42 @@ TEST_F(FinishingTest, PartsOfLightMoveByTheSameWeights) {
 }
 
 TEST_F(FinishingTest, LightThatManyPixelsLostComesBack) {
-    for (int c = 0; c < 3; ++c) level_.set(level_.data, data_.removed() + c, 0.1f);
+    for (int c = 0; c < 3; ++c) {
+        level_.set(level_.data, data_.removed() + c, 0.1f);
+        level_.set(level_.combined, planes_.variance() + c, 0.04f);
+    }
     finish();
     for (const auto& [x, y] : {std::pair{20, 20}, {0, 0}, {39, 5}}) {
-        EXPECT_NEAR(value(1, x, y), 1.1, 0.004) << x;   // 4 in 100 effective pixels at the corner
-        EXPECT_NEAR(value(3, x, y), 0.55, 0.002) << x;  // a part of R by R's share
+        EXPECT_NEAR(value(1, x, y), 1.1, 0.002) << x;   // 1 in 100 effective pixels at the corner
+        EXPECT_NEAR(value(3, x, y), 0.55, 0.001) << x;  // a part of R by R's share
+        // What moved is not known better than that it moved; what was lost, to as many samples as lost it.
+        EXPECT_NEAR(value(4, x, y), std::sqrt(0.04 + 0.01), 0.002) << x;
     }
-    EXPECT_NEAR(returned_, 0.1 * 8 * kSide * kSide, 0.002 * 8 * kSide * kSide);
+    EXPECT_NEAR(counts_.moved, 0.1 * 8 * kSide * kSide, 0.001 * 8 * kSide * kSide);
+    EXPECT_NEAR(counts_.image / counts_.samples, 1, 0.001);
 }
 
 TEST_F(FinishingTest, LightThatOnePixelLostIsNoKnowledge) {
-    for (int c = 0; c < 3; ++c) level_.data.row(data_.removed() + c, 20)[20] = 100;
+    for (int c = 0; c < 3; ++c) {
+        level_.data.row(data_.removed() + c, 20)[20] = 100;
+        level_.set(level_.combined, planes_.variance() + c, 0.04f);
+    }
     finish();
-    EXPECT_EQ(value(0, 21, 20), 1);
-    EXPECT_LT(returned_, 1e-4);  // of 100 samples' worth
+    EXPECT_NEAR(value(0, 21, 20), 1, 1e-4);
+    EXPECT_LT(counts_.moved, 1e-1);  // of 100 samples' worth
+}
+
+TEST_F(FinishingTest, NoPixelTakesMoreLightThanItsDeviation) {
+    for (int c = 0; c < 3; ++c) {
+        for (const int half : {0, 1}) level_.set(level_.data, data_.mean(half) + c, 100);
+        level_.set(level_.combined, planes_.variance() + c, 0.04f);
+        level_.combined.row(planes_.variance() + c, 20)[20] = 0;
+        level_.combined.row(planes_.variance() + c, 20)[10] = 4;
+    }
+    finish();
+    EXPECT_NEAR(value(0, 5, 5), 1.2, 1e-6);
+    EXPECT_EQ(value(0, 20, 20), 1);          // what is known takes none
+    EXPECT_NEAR(value(0, 10, 20), 2, 1e-6);  // and none more than it has
 }
 
 }  // namespace

@@ -410,11 +410,39 @@ TEST(NeverSure, AWildFeatureValueCostsItsPixelOnly) {
     const auto two = [](int x, int y) { return (x == 16 || x == 30) && y == 20; };
     for (const char* feature : {"albedo", "Z"}) {
         const double tame = errorWith(feature, 0.4f, one);
-        for (const float value : {2.f, 8.f, 100.f, -50.f, 1e10f}) {
+#ifdef VARIOLUX_SANITIZED
+        const std::vector<float> values = {8.f};
+#else
+        const std::vector<float> values = {2.f, 8.f, 100.f, -50.f, 1e10f};
+#endif
+        for (const float value : values) {
             EXPECT_LT(errorWith(feature, value, one), 1.5 * tame) << feature << " " << value;
             EXPECT_LT(errorWith(feature, value, two), 2 * tame) << feature << " " << value;
         }
     }
+}
+
+// Few data fix functions between them, not beyond: what was predicted at pixels without samples was 70 times
+// as bright as any sample.
+TEST(NeverSure, NoFunctionIsFollowedBeyondTheData) {
+    float brightest = 0;
+    const SampleBuffer dump =
+        picture(64, {"R", "G", "B", "albedo.R", "albedo.G", "albedo.B", "N.X", "N.Y", "N.Z"}, 2,
+                [&](int x, int y, Random& random, auto& samples) {
+                    std::bernoulli_distribution sampled(0.06), bright(0.05);
+                    std::uniform_real_distribution<float> uniform(0, 1);
+                    if (!sampled(random)) return;
+                    const float z = bright(random) ? uniform(random) * 5 : 0.02f * uniform(random);
+                    const float edge = (x / 9 + y / 7) % 2 > 0 ? 0.8f : 0.2f;
+                    const float albedo = edge + (uniform(random) < 0.2f ? 0.5f * uniform(random) : 0.f);
+                    const float n = uniform(random) < 0.3f ? uniform(random) : 0.1f;
+                    brightest = std::max(brightest, z);
+                    samples.push_back({z, z * 0.9f, z * 0.7f, albedo, albedo, albedo * 0.9f, n, 1 - n, 0.3f});
+                });
+    const Image image = reconstruct(dump, Drift{}).image;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x)
+            ASSERT_LT(image.at(x, y)[0], 1.5 * static_cast<double>(brightest)) << x << " " << y;
 }
 
 // Squares of radiance beyond 1e19 are no floats: such samples are dropped as if they were not finite.

@@ -123,9 +123,27 @@ struct DifferencePlanes {
     int channels() const { return radiance + 8; }
 };
 
-/// Light that fireflies lost, and light that is there, summed along a row.
+/// The picture before its light is set right.
+struct CleanPlanes {
+    int radiance = 3;
+
+    int value() const { return 0; }            ///< r
+    int variance() const { return radiance; }  ///< R, G, B
+    int channels() const { return radiance + 3; }
+};
+
+/// Sums along a row of the near window, 0, and of the wide one, 1 (light.h).
 struct LightPlanes {
-    static constexpr int kChannels = 7;  ///< lost of R, G, B; its square; R, G, B
+    static constexpr int missing(int window) { return 7 * window; }     ///< R, G, B
+    static constexpr int room(int window) { return 7 * window + 3; }    ///< R, G, B
+    static constexpr int square(int window) { return 7 * window + 6; }  ///< of what is missing
+    static constexpr int kLost = 14;   ///< squares of what fireflies lost, near
+    static constexpr int kLight = 15;  ///< that is there, near
+    static constexpr int kChannels = 16;
+
+    static constexpr bool isSquare(int plane) {
+        return plane == square(0) || plane == square(1) || plane == kLost;
+    }
 };
 
 /// Mean of all samples of a pixel; 0 where it has none.

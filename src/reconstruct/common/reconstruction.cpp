@@ -30,6 +30,8 @@ nlohmann::ordered_json json(const DriftReport& report) {
     return {{"limitedSamples", report.limitedSamples},
             {"energyRemoved", report.energyRemoved},
             {"energyReturned", report.energyReturned},
+            {"light", report.light},
+            {"lightError", report.lightError},
             {"farPixels", report.farPixels},
             {"exactPixels", report.exactPixels},
             {"neighbourhoods", report.neighbourhoods},
@@ -144,6 +146,8 @@ std::string inWords(const DriftReport& report) {
          << (report.energyRemoved - report.energyReturned > kMuchLight
                  ? " (WARNING: much; where few samples find the light, --fireflies keep keeps it)\n"
                  : "\n")
+         << "the image has " << 100 * report.light << " % of its samples' light (standard error "
+         << 100 * report.lightError << " %)\n"
          << report.neighbourhoods << " neighbourhoods kriged, "
          << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";

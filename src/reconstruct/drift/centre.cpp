@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "reconstruct/drift/gram.h"
 #include "reconstruct/drift/wild_values.h"
@@ -33,6 +34,7 @@ void Centre::begin(const TilePlanes& tile, int at, int reach) {
     index_.clear();
     weights_.clear();
     predicted_.clear();
+    gaps_ = false;
     noise_ = total_ = 0;
 }
 
@@ -53,6 +55,7 @@ void Centre::add(int dx, int dy, float alike) {
     p[2 * stride_] = px * px;
     p[3 * stride_] = py * py;
     p[4 * stride_] = px * py;
+    gaps_ = gaps_ || !datum;
     if (!datum) return;
     noise_ += static_cast<double>(alike * ratio) * tile_.errors[place] * ratio;
     total_ += static_cast<double>(alike * ratio);
@@ -161,6 +164,23 @@ RandomDrift Centre::fit() {
     return fitRandomDrift(moments, group_, tile_.groups + 2, kPriorIterations);
 }
 
+/// No function is followed beyond the data: pixels without any take its nearest value among them. Few data
+/// fix coefficients that hold between them, and are thousands of times too large elsewhere.
+void Centre::limitFunctions() {
+    const auto n = static_cast<std::size_t>(size());
+    for (int j = 1; j <= functions_; ++j) {
+        float* const x = row(j);
+        float least = std::numeric_limits<float>::infinity(), most = -least;
+        for (std::size_t i = 0; i < n; ++i) {
+            if (weights_[i] <= 0) continue;
+            least = std::min(least, x[i]);
+            most = std::max(most, x[i]);
+        }
+        for (std::size_t i = 0; i < n; ++i)
+            if (weights_[i] <= 0) x[i] = std::clamp(x[i], least, most);
+    }
+}
+
 void Centre::predict(const RandomDrift& drift, float* sums) {
     const EstimatePlanes out{tile_.radiance};
     const int n = size(), padded = lanesUp(n);
@@ -174,6 +194,7 @@ void Centre::predict(const RandomDrift& drift, float* sums) {
     for (int i = 0; i < n; ++i)
         predicted_[static_cast<std::size_t>(i)] *= perNoise * taper(row(1)[i]) * taper(row(2)[i]);
     scatter(predicted_.data(), sums + TilePlanes::plane(out.weight()));
+    if (gaps_) limitFunctions();
     // Kriging variance, on average over the data: the constant and each effective function cost one part in
     // as many as there are.
     const auto part = static_cast<float>((1 + drift.effective) / total_);

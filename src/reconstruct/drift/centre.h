@@ -50,6 +50,7 @@ class Centre {
     void stackFunctions();
     void stackRadiance();
     RandomDrift fit();
+    void limitFunctions();
     void predict(const RandomDrift& drift, float* sums);
     void scatter(const float* values, float* to) const;
 
@@ -58,6 +59,7 @@ class Centre {
     int reach_ = 0, stride_ = 0;
     std::vector<int> index_;                  // of the data, in a plane
     std::vector<float> weights_, predicted_;  // of the data; of what is predicted there
+    bool gaps_ = false;                       // pixels without data are among them
     double noise_ = 0, total_ = 0;            // sums over data: of weighted error variances, of weights
     double variance_ = 0;                     // of a datum of weight 1
 

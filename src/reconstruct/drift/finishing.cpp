@@ -13,8 +13,6 @@ namespace vlx {
 
 namespace {
 
-constexpr double kKnown = 4;  // (standard errors of lost light that are none)^2
-
 /// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
 double coverage(double alpha) {
     constexpr double kRounding = 1e-5;
@@ -27,14 +25,6 @@ int colourOf(const std::string& channel) {
     const std::string last = channel.substr(channel.rfind('.') + 1);
     const std::size_t at = std::string("RGB").find(last);
     return last.size() == 1 && at != std::string::npos ? static_cast<int>(at) : -1;
-}
-
-/// Of a pixel `d` columns or rows away: smooth to the window's border, which would show where much light
-/// comes back.
-double lightWeight(int d) {
-    constexpr double kSide = Finishing::kLightReach + 1;
-    const double u = 1 - d * d / (kSide * kSide);
-    return u * u;
 }
 
 /// Calls f(col, row) for the up to eight neighbours of a pixel.
@@ -52,6 +42,7 @@ Finishing::Finishing(const SampleLayout& layout, double strength, int scale, con
     : layout_(layout),
       planes_{layout.radiance},
       combinedPlanes_{layout.radiance},
+      cleanPlanes_{layout.radiance},
       strength_(strength),
       scale_(scale),
       width_(level.width),
@@ -63,7 +54,7 @@ Finishing::Finishing(const SampleLayout& layout, double strength, int scale, con
       variances_(level.variances),
       combined_(combined),
       clean_(clean),
-      light_(light) {
+      light_(level.width, level.height, light) {
     for (int c = 0; c < radiance_; ++c)
         colour_.push_back(c == layout.alpha ? -1 : colourOf(layout.names[static_cast<std::size_t>(c)]));
 }
@@ -128,77 +119,65 @@ void Finishing::cleanRow(int y) {
     }
 }
 
-void Finishing::lightRow(int y) {
-    const auto w = static_cast<std::size_t>(width_);
-    std::vector<double> in(LightPlanes::kChannels * w);
-    for (std::size_t i = 0; i < w; ++i)
-        for (std::size_t c = 0; c < 3; ++c) {
-            const double lost = data_.row(planes_.removed() + static_cast<int>(c), y)[i];
-            in[c * w + i] = lost;
-            in[3 * w + i] += lost * lost;
-            in[(4 + c) * w + i] = std::max(0.f, clean_.row(static_cast<int>(c), y)[i]);
-        }
-    for (int k = 0; k < LightPlanes::kChannels; ++k)
-        for (int x = 0; x < width_; ++x) {
-            double sum = 0;
-            for (int col = std::max(0, x - kLightReach); col <= std::min(width_ - 1, x + kLightReach);
-                 ++col) {
-                const double weight = lightWeight(col - x);
-                sum += (k == 3 ? weight * weight : weight) *
-                       in[static_cast<std::size_t>(k) * w + static_cast<std::size_t>(col)];
-            }
-            light_.row(k, y)[x] = static_cast<float>(sum);
-        }
-}
-
-/// By what share R, G, B and all of them grow, pixel by pixel of row y, so that what fireflies lost around is
-/// given back in proportion to the light there, by how much of it is no accident of a few samples:
-/// (1 - 4 sum r^2 / (sum r)^2)+, nothing within two standard errors. Last, the variance of what was lost, sum
-/// r^2, as a share of the light's square.
-std::vector<double> Finishing::returned(int y) const {
-    const auto w = static_cast<std::size_t>(width_);
-    std::vector<double> sums(LightPlanes::kChannels * w), shares(5 * w);
-    for (int row = std::max(0, y - kLightReach); row <= std::min(height_ - 1, y + kLightReach); ++row) {
-        const double weight = lightWeight(row - y);
-        for (int k = 0; k < LightPlanes::kChannels; ++k) {
-            const float* in = light_.row(k, row);
-            double* sum = sums.data() + static_cast<std::size_t>(k) * w;
-            for (std::size_t i = 0; i < w; ++i) sum[i] += (k == 3 ? weight * weight : weight) * in[i];
-        }
-    }
-    for (std::size_t i = 0; i < w; ++i) {
-        double square = 0, lost = 0, light = 0;
-        for (std::size_t c = 0; c < 3; ++c) {
-            square += sums[c * w + i] * sums[c * w + i];
-            lost += sums[c * w + i];
-            light += sums[(4 + c) * w + i];
-        }
-        const double known = shrinkage(square, kKnown * sums[3 * w + i]);
-        for (std::size_t c = 0; c < 3; ++c)
-            if (sums[(4 + c) * w + i] > 0)
-                shares[c * w + i] = known * sums[c * w + i] / sums[(4 + c) * w + i];
-        if (light <= 0) continue;
-        shares[3 * w + i] = known * lost / light;
-        shares[4 * w + i] = 3 * sums[3 * w + i] / (light * light);
-    }
-    return shares;
-}
-
-Finishing::Counts Finishing::outputRow(int y, float* out) const {
-    const std::vector<double> shares = returned(y);
-    Counts counts;
-    for (int x = 0; x < width_; ++x, out += radiance_ + 3) {
+void Finishing::errorRow(int y) {
+    Light::Row row(width_);
+    for (int x = 0; x < width_; ++x) {
         const double n = data_.row(planes_.count(), y)[x];
-        const bool exact = isExact(x, y);
-        counts.exact += exact;
-        double shared[3];
-        sharedVariance(x, y, shared);
-        const double gap = data_.row(planes_.gap(), y)[x];
-        const double strength = n > 0 ? strength_ : 1;
         const double leverage = combined_.row(combinedPlanes_.leverage(), y)[x];
         const bool twoHalves =
             data_.row(planes_.halfCount(0), y)[x] > 0 && data_.row(planes_.halfCount(1), y)[x] > 0;
-        double back[3] = {};
+        const bool exact = isExact(x, y);
+        double shared[3];
+        sharedVariance(x, y, shared);
+        for (int c = 0; c < 3; ++c) {
+            // The noise of the halves' common data is estimated twice, by what the halves differ in and by
+            // the kriging variance: half of each.
+            double variance =
+                shared[c] / 2 + static_cast<double>(combined_.row(combinedPlanes_.variance() + c, y)[x]);
+            variance += gapVariance(c, x, y);
+            // A pixel's own scatter beyond two standard deviations raises its variance, by as much as the
+            // pixel itself is in its estimate.
+            if (twoHalves) {
+                const double apart = static_cast<double>(data_.row(planes_.mean(0) + c, y)[x]) -
+                                     static_cast<double>(data_.row(planes_.mean(1) + c, y)[x]);
+                variance +=
+                    leverage * leverage * std::max(0.0, apart * apart / 4 - 4 * meanVariance(c, x, y));
+            }
+            clean_.row(cleanPlanes_.variance() + c, y)[x] = static_cast<float>(exact ? 0 : variance);
+            if (exact || n == 0) continue;  // nothing is missing, or nobody knows
+            const auto i = static_cast<std::size_t>(x);
+            const float lost = data_.row(planes_.removed() + c, y)[x], value = clean_.row(c, y)[x];
+            row.value[c][i] = value;
+            row.deviation[c][i] = static_cast<float>(std::sqrt(variance));
+            row.lost[c][i] = lost;
+            row.missing[c][i] = static_cast<float>(plainMean(data_, planes_, c, x, y)) + lost - value;
+        }
+    }
+    light_.sumRow(y, row);
+}
+
+Finishing::Counts Finishing::outputRow(int y, float* out) const {
+    const Light::Shares shares = light_.shares(y);
+    Counts counts;
+    for (int x = 0; x < width_; ++x, out += radiance_ + 3) {
+        const auto i = static_cast<std::size_t>(x);
+        const double n = data_.row(planes_.count(), y)[x];
+        const bool exact = isExact(x, y);
+        counts.exact += exact;
+        const double strength = n > 0 ? strength_ : 1;
+        // What the pixel takes of the light that is missing: of R, G, B, and of all of them.
+        double moved[3] = {}, all = 0, light = 0;
+        for (int c = 0; c < 3; ++c) {
+            const double value = clean_.row(c, y)[x];
+            // Not of what is not known for want of samples: those around have none of it.
+            const double variance =
+                static_cast<double>(clean_.row(cleanPlanes_.variance() + c, y)[x]) - gapVariance(c, x, y);
+            moved[c] =
+                Light::step(shares.moved[c][i], value, std::sqrt(std::max(0.0, variance)), shares.lost[i]);
+            all += moved[c];
+            light += std::max(0.0, value);
+        }
+        double samples[3] = {}, image[3] = {};
         for (int c = 0; c < radiance_; ++c) {
             const double mean = plainMean(data_, planes_, c, x, y);
             double value = clean_.row(c, y)[x];
@@ -207,36 +186,39 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
                 value = coverage(value);
             } else {
                 const int colour = colour_[static_cast<std::size_t>(c)];
-                const double more =
-                    std::max(0.0, value) *  // as where the shares come from: what is negative is no light
-                    shares[static_cast<std::size_t>((colour < 0 ? 3 : colour) * width_ + x)];
-                value += more;
-                if (c < 3 && !exact) back[c] = strength * more;
+                const double whole = colour < 0 ? light : std::max(0.f, clean_.row(colour, y)[x]);
+                if (whole > 0 && value > 0) value += value * (colour < 0 ? all : moved[colour]) / whole;
                 if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0) value = std::max(0.0, value);
             }
             const double chosen = exact ? mean : value;
             out[c] = static_cast<float>(mean + strength * (chosen - mean));
             if (c >= 3) continue;
-            // The noise of the halves' common data is estimated twice, by what the halves differ in and by
-            // the kriging variance: half of each.
-            double variance =
-                shared[c] / 2 + static_cast<double>(combined_.row(combinedPlanes_.variance() + c, y)[x]);
-            variance += value * value * shares[static_cast<std::size_t>(4 * width_ + x)];
-            if (gap > 0) variance += picture_.semivarianceAt(c, gap / scale_);
-            const double meanVariance = static_cast<double>(variances_.row(c, y)[x]) / std::max(1.0, n);
-            // A pixel's own scatter beyond two standard deviations raises its variance, by as much as the
-            // pixel itself is in its estimate.
-            if (twoHalves) {
-                const double apart = static_cast<double>(data_.row(planes_.mean(0) + c, y)[x]) -
-                                     static_cast<double>(data_.row(planes_.mean(1) + c, y)[x]);
-                variance += leverage * leverage * std::max(0.0, apart * apart / 4 - 4 * meanVariance);
-            }
+            samples[c] = mean + static_cast<double>(data_.row(planes_.removed() + c, y)[x]);
+            image[c] = out[c];
+            const double variance = static_cast<double>(clean_.row(cleanPlanes_.variance() + c, y)[x]) +
+                                    moved[c] * moved[c] + Light::lostVariance(shares.lost[i], value);
             out[radiance_ + c] = static_cast<float>(
-                exact ? 0 : std::sqrt(strength * variance + (1 - strength) * meanVariance));
+                exact ? 0 : std::sqrt(strength * variance + (1 - strength) * meanVariance(c, x, y)));
         }
-        counts.returned += n * luminance(back);
+        if (n == 0) continue;
+        if (!exact) counts.moved += n * strength * luminance(moved[0], moved[1], moved[2]);
+        counts.samples += luminance(samples[0], samples[1], samples[2]);
+        counts.image += luminance(image[0], image[1], image[2]);
+        // Colours of a sample go together.
+        const double noise = luminance(std::sqrt(meanVariance(0, x, y)), std::sqrt(meanVariance(1, x, y)),
+                                       std::sqrt(meanVariance(2, x, y)));
+        counts.noise += noise * noise;
     }
     return counts;
+}
+
+double Finishing::gapVariance(int c, int x, int y) const {
+    const double gap = data_.row(planes_.gap(), y)[x];
+    return gap > 0 ? picture_.semivarianceAt(c, gap / scale_) : 0;
+}
+
+double Finishing::meanVariance(int c, int x, int y) const {
+    return static_cast<double>(variances_.row(c, y)[x]) / std::max(1.f, data_.row(planes_.count(), y)[x]);
 }
 
 /// Whether the dump states that the pixel, and every one that its error variance was pooled over, has none.

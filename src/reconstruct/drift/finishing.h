@@ -5,6 +5,7 @@
 
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/drift/level.h"
+#include "reconstruct/drift/light.h"
 
 /// From the combined estimate to the picture and its error: drift.h, 7 to 9.
 namespace vlx {
@@ -12,12 +13,9 @@ namespace vlx {
 /// Refers to its level and rings. Rows may be worked on at the same time.
 class Finishing {
   public:
-    static constexpr int kLightReach =
-        16;  ///< pixels: a window of 33 x 33 pixels, (1 - u^2)^2 along each axis
     static constexpr int kAlikeReach = 2;  ///< of the error map: 5 x 5 pixels
 
-    /// `combined`: CombinedPlanes, instead of the level's own; `clean`: radiance channels; `light`:
-    /// LightPlanes.
+    /// `combined`: CombinedPlanes, instead of the level's own; `clean`: CleanPlanes; `light`: LightPlanes.
     Finishing(const SampleLayout& layout, double strength, int scale, const PictureScale& picture,
               const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light);
 
@@ -26,14 +24,18 @@ class Finishing {
     /// the variance of a sample, or the mean of it over 3 x 3 pixels. All channels move by the same weight,
     /// along the line to the neighbour nearest to the range's border. Combined rows y - 1 to y + 1 are there.
     void cleanRow(int y);
-    /// Row y of `light`, weighted sums along the row. Clean row y is there.
-    void lightRow(int y);
+    /// The variance of row y of `clean`, and row y of `light`. Clean row y and combined rows y - kAlikeReach
+    /// to y + kAlikeReach are there.
+    void errorRow(int y);
     struct Counts {
         std::int64_t exact = 0;  ///< pixels
-        double returned = 0;     ///< luminance, summed over samples
+        double moved = 0;        ///< luminance given back, summed over samples
+        // Of pixels with samples: luminance of the samples' means, of the image, and the first one's
+        // variance.
+        double samples = 0, image = 0, noise = 0;
     };
-    /// Row y of the picture: radiance channels and stddev of R, G, B, interleaved. Rows of kLightReach around
-    /// it are there.
+    /// Row y of the picture: radiance channels and stddev of R, G, B, interleaved. Rows of LightReach::kNear
+    /// around it are there.
     Counts outputRow(int y, float* out) const;
 
   private:
@@ -41,17 +43,20 @@ class Finishing {
     bool isExact(int x, int y) const;
     float likeness(int x, int y, int col, int row) const;
     void sharedVariance(int x, int y, double* variance) const;
-    std::vector<double> returned(int y) const;
+    double meanVariance(int c, int x, int y) const;
+    double gapVariance(int c, int x, int y) const;
 
     const SampleLayout& layout_;
     DataPlanes planes_;
     CombinedPlanes combinedPlanes_;
+    CleanPlanes cleanPlanes_;
     double strength_;
     int scale_, width_, height_, radiance_;
     std::vector<int> colour_;  // of each radiance channel: 0 to 2, or -1: none of these
     const PictureScale& picture_;
     const RowRing &data_, &features_, &variances_, &combined_;
-    RowRing &clean_, &light_;
+    RowRing& clean_;
+    Light light_;
 };
 
 }  // namespace vlx

@@ -90,7 +90,7 @@ class Pipeline {
                   options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
           differences_(width_, halved_ ? DifferencePlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
-          clean_(width_, radiance_, kept(kFinishingRows)),
+          clean_(width_, CleanPlanes{radiance_}.channels(), kept(kFinishingRows)),
           light_(width_, LightPlanes::kChannels, kept(kFinishingRows)),
           finishing_(layout_, options.strength, options.scale, picture_, fine_.rows(),
                      halved_ ? corrected_ : fine_.rows().combined, clean_, light_) {
@@ -121,6 +121,10 @@ class Pipeline {
             drift_.energyRemoved = removed_ / luminance_;
             drift_.energyReturned = returned_ / luminance_;
         }
+        if (samplesLight_ > 0) {
+            drift_.light = imageLight_ / samplesLight_;
+            drift_.lightError = std::sqrt(lightNoise_) / samplesLight_;
+        }
         for (const auto& [stage, seconds] : drift_.seconds)
             (stage == "read" ? report_.readSeconds : report_.solveSeconds) += seconds;
         return std::move(report_);
@@ -141,8 +145,8 @@ class Pipeline {
     /// image.
     void startAbove(int first) {
         finishedRows_ = first;
-        cleanRows_ = std::max(0, first - Finishing::kLightReach);
-        correctedRows_ = std::max(0, cleanRows_ - 1);
+        cleanRows_ = std::max(0, first - LightReach::kNear);
+        correctedRows_ = std::max(0, cleanRows_ - Finishing::kAlikeReach);
         differenceRows_ = std::max(0, correctedRows_ - Correction::kReach);
         int filled = fine_.startAbove(halved_ ? fineAbove(differenceRows_) : correctedRows_);
         if (halved_) filled = std::min(filled, 2 * coarse_->startAbove(differenceRows_ / 2 - 1));
@@ -283,10 +287,10 @@ class Pipeline {
     void clean(int until) {
         until = std::min(until, height_);
         if (cleanRows_ >= until) return;
-        correct(until + 1);
+        correct(until + Finishing::kAlikeReach);
         parallelFor(cleanRows_, until, [&](std::int64_t y) {
             finishing_.cleanRow(static_cast<int>(y));
-            finishing_.lightRow(static_cast<int>(y));
+            finishing_.errorRow(static_cast<int>(y));
         });
         cleanRows_ = until;
         clock_.addTo("finishing");
@@ -294,7 +298,7 @@ class Pipeline {
 
     void finish(int until) {
         until = std::min(until, height_);
-        clean(until + Finishing::kLightReach);
+        clean(until + LightReach::kNear);
         std::vector<Finishing::Counts> counts(static_cast<std::size_t>(until - finishedRows_));
         parallelFor(finishedRows_, until, [&](std::int64_t y) {
             const auto row = static_cast<int>(y) - finishedRows_;
@@ -303,7 +307,10 @@ class Pipeline {
         });
         for (const Finishing::Counts& of : counts) {
             drift_.exactPixels += of.exact;
-            returned_ += of.returned;
+            returned_ += of.moved;
+            samplesLight_ += of.samples;
+            imageLight_ += of.image;
+            lightNoise_ += of.noise;
         }
         clock_.addTo("finishing");
         sink_(rows_.pixels.data(), until - finishedRows_);
@@ -336,7 +343,8 @@ class Pipeline {
     int gatheredRows_ = 0, filledRows_ = 0, differenceRows_ = 0, correctedRows_ = 0, cleanRows_ = 0,
         finishedRows_ = 0;
     double luminance_ = 0, removed_ = 0, returned_ = 0;
-    Image rows_;  // finished, on their way out
+    double samplesLight_ = 0, imageLight_ = 0, lightNoise_ = 0;  // Finishing::Counts
+    Image rows_;                                                 // finished, on their way out
 };
 
 }  // namespace
