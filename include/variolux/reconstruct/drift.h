@@ -42,8 +42,10 @@
 ///    frequency, which neighbourhoods of a few pixels share, is less at half the resolution. Pictures of less
 ///    than 32 pixels along an axis have no such level.
 /// 7. *Outliers and light*: a pixel beyond the range of its eight neighbours moves towards them by the share
-///    of the excess that its own noise explains. What fireflies lost in the 33 x 33 pixels around is given
-///    back in proportion to the light there, as far as it is beyond two standard errors (finishing.h).
+///    of the excess that its own noise explains. What the samples around (33 x 33 pixels, and 513 along
+///    rows) have more light than the estimate is given back in proportion to y^1.5, as far as it is no
+///    accident, by no more than a pixel's standard deviation (drift/light.h): the image's mean stays within
+///    about 1 % of the samples', or two standard errors of it.
 /// 8. *Error map*: the estimator's own variance. The noise of the halves' common data is estimated twice, and
 ///    half of each taken: by what the halves' combinations differ in, (A - B)^2 / 4 over 5 x 5 pixels of
 ///    alike features; and by the kriging variance of the neighbourhoods, v (1 + p) / sum w (p effective
