@@ -17,7 +17,8 @@ const std::vector<OptionUse>& usesByMethod() {
         {{"--clamp"}, {"--fireflies clamp"}},
         {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
         {{"--sigma"}, {"--method gaussian"}},
-        {{"--region", "--whole-image", "--no-colour-distance", "--diagnostics"}, {"--method paper"}},
+        {{"--region", "--whole-image", "--no-colour-distance"}, {"--method paper"}},
+        {{"--diagnostics"}, {"--method krige", "--method paper"}},
         {{"--inspect"}, {"--diagnostics"}},
         {{"--positions"},
          {"--method paper", "--scale 2 to 4", "--filter gaussian", "--filter blackman-harris"}}};
@@ -128,8 +129,10 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
                  "paper: distance on the image plane only, to show what the colour distance does");
     app.add_flag(
         "--diagnostics", o.diagnostics,
-        "paper: also write layers diagnostics.* (nugget, sill, range, exponent, errorVariance, outcome) "
-        "and OUTPUT.json with everything about each region");
+        "krige, paper: also write layers diagnostics.* and OUTPUT.json: of each region the variogram's "
+        "nugget, "
+        "sill, range, exponent and what was made of it; with krige, of what the estimate lacks, region by "
+        "region, and whether that has any structure");
     app.add_option(
            "--inspect", o.inspect,
            "With --diagnostics: put the variogram cloud, its classes and cross-validation of the region "

@@ -155,8 +155,8 @@ void checkOneOwnerOfOutput(CLI::App& app, LogFormat format) {
     for (CLI::App* const command : allOf(app)) {
         const CLI::Option* json = command->get_option_no_throw("--json");
         if (command->parsed() && json != nullptr && json->count() > 0)
-            throw CLI::ValidationError("--json",
-                                       "expected not with --log openjd: both write standard output; use --log json");
+            throw CLI::ValidationError(
+                "--json", "expected not with --log openjd: both write standard output; use --log json");
     }
 }
 

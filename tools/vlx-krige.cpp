@@ -136,11 +136,14 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     const bool usesPositions =
         o.method == vlx::KrigeMethod::Paper || o.krige.scale > 1 || o.filter != vlx::PixelFilter::Box;
     const vlx::PositionedSamples dump(*source, o.positions, usesPositions);
+    vlx::Window picture = dump.header().data;
+    picture = {picture.x * o.krige.scale, picture.y * o.krige.scale, picture.width * o.krige.scale,
+               picture.height * o.krige.scale};
     for (const auto& [x, y] : o.paper.inspect)
-        if (!dump.header().data.contains(x, y))
-            throw CLI::ValidationError("--inspect", "expected a pixel of the picture, " +
-                                                        inWords(dump.header().data) + ", found " +
-                                                        std::to_string(x) + "," + std::to_string(y));
+        if (!picture.contains(x, y))
+            throw CLI::ValidationError("--inspect", "expected a pixel of the picture, " + inWords(picture) +
+                                                        ", found " + std::to_string(x) + "," +
+                                                        std::to_string(y));
     const vlx::ChannelMap replaced =
         original.empty() ? vlx::ChannelMap() : replacedLayers(o, original, *source);
     vlx::LayerCopy copied;
@@ -196,11 +199,16 @@ int run(vlx::KrigeOptions& o) {
         o.krige.band = vlx::parseBand(o.band);
         if (o.filter != vlx::PixelFilter::Box)  // it reaches into the bands beside
             throw CLI::ValidationError("--band goes with --filter box");
+        if (o.diagnostics)
+            throw CLI::ValidationError("--band goes without --diagnostics, whose regions it would cut");
     }
     for (const std::string& text : o.inspect) o.paper.inspect.push_back(vlx::parsePixel(text));
+    o.krige.inspect = o.paper.inspect;
+    o.krige.diagnostics = o.diagnostics;
     if (!o.maxMemory.empty()) {
-        if (o.filter != vlx::PixelFilter::Box || !o.samplingMap.empty())
-            throw CLI::ValidationError("--max-memory goes with --filter box and no --sampling-map");
+        if (o.filter != vlx::PixelFilter::Box || !o.samplingMap.empty() || o.diagnostics)
+            throw CLI::ValidationError(
+                "--max-memory goes with --filter box, without --sampling-map and --diagnostics");
         o.krige.maxMemory = vlx::parseMemory(o.maxMemory);
 #ifdef __GLIBC__
         mallopt(M_MMAP_THRESHOLD, 1 << 20);  // what is done with is given back

@@ -70,9 +70,7 @@ void Fingerprint::checkUnchanged() const {
         if (identityOf(file.path) != file.identity) throw Error(file.path, "changed while it was read");
 }
 
-std::string Fingerprint::text(const Band& band) const {
-    return inputsOfBand(digest(folded_), band);
-}
+std::string Fingerprint::text(const Band& band) const { return inputsOfBand(digest(folded_), band); }
 
 std::string fileFingerprint(const std::string& path) {
     if (const auto found = digestOfFile(path)) return *found;

@@ -191,7 +191,8 @@ SampleBand PositionedSamples::read(int y, int rows, const std::vector<std::strin
                 ys[s] = static_cast<float>(ry);
             }
         for (int row = 0; row < rows; ++row) {
-            auto checked = checked_[static_cast<std::size_t>(y - header().data.y) + static_cast<std::size_t>(row)];
+            auto checked =
+                checked_[static_cast<std::size_t>(y - header().data.y) + static_cast<std::size_t>(row)];
             if (!checked) check_.add(band, row);
             checked = true;
         }

@@ -17,9 +17,9 @@ struct MergeOptions {
     std::string inputs = {};
 };
 
-/// What the parts of a whole picture say together of what they were made of (kInputsAttribute): where they are
-/// all the bands of one run, what the run of the whole picture would say; else nothing. Throws Error when parts
-/// cannot be read and when bands are of runs with different inputs or parameters, naming both files.
+/// What the parts of a whole picture say together of what they were made of (kInputsAttribute): where they
+/// are all the bands of one run, what the run of the whole picture would say; else nothing. Throws Error when
+/// parts cannot be read and when bands are of runs with different inputs or parameters, naming both files.
 std::string wholeInputs(const std::vector<std::string>& parts);
 
 struct MergeReport {

@@ -39,17 +39,21 @@ ReconstructionReport reconstructGaussian(const SampleSource& source, const Gauss
 
 }  // namespace
 
+void requireInside(const std::vector<std::pair<int, int>>& pixels, const Window& window,
+                   const std::string& path) {
+    for (const auto& [x, y] : pixels)
+        if (!window.contains(x, y))
+            throw Error(path, "expected pixels to inspect within " + windowText(window) + ", found (" +
+                                  std::to_string(x) + ", " + std::to_string(y) + ")");
+}
+
 Image outline(const SampleSource& source, const Method& method) {
     if (const Drift* drift = std::get_if<Drift>(&method)) return driftOutline(source, *drift);
     if (const Gaussian* gaussian = std::get_if<Gaussian>(&method))
         if (const auto broken = gaussian->validate()) throw Error("", *broken);
     if (const Paper* paper = std::get_if<Paper>(&method)) {
         if (const auto broken = paper->validate()) throw Error("", *broken);
-        for (const auto& [x, y] : paper->inspect)
-            if (!source.header().data.contains(x, y))
-                throw Error(source.path(), "expected pixels to inspect within " +
-                                               windowText(source.header().data) + ", found (" +
-                                               std::to_string(x) + ", " + std::to_string(y) + ")");
+        requireInside(paper->inspect, source.header().data, source.path());
     }
     Image image;
     image.data = source.header().data;

@@ -58,8 +58,8 @@ TEST_F(Input, OptionsThatTheMethodDoesNotReadAreBadUsage) {
         {{"--region", "8"}, "paper"},
         {{"--whole-image"}, "paper"},
         {{"--no-colour-distance"}, "paper"},
-        {{"--diagnostics"}, "paper"},
-        {{"--diagnostics", "--inspect", "101,121"}, "paper"},
+        {{"--diagnostics"}, "krige paper"},
+        {{"--diagnostics", "--inspect", "101,121"}, "krige paper"},
         {{"--positions", "raster"}, "paper"}};
     for (const std::string method : {"krige", "paper", "mean", "gaussian"})
         for (const auto& [given, readers] : options) {
@@ -92,6 +92,7 @@ TEST_F(Input, OptionsThatTheMethodDoesNotReadAreBadUsage) {
                                             "--sampling-map",
                                             map},
                                   {"krige", "--band", "1/2", "--max-memory", "4G", "--layers-are-samples"},
+                                  {"krige", "--diagnostics", "--inspect", "101,121"},
                                   {"paper", "--region", "8", "--no-colour-distance", "--diagnostics",
                                    "--inspect", "101,121", "--positions", "raster", "--sampling-map", map},
                                   {"paper", "--whole-image"},

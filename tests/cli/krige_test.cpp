@@ -134,7 +134,7 @@ TEST(VlxKrige, BadUsageIsExitTwo) {
           {kDump, "-o", out, "--method", "paper", "--region", "0"},
           {kDump, "-o", out, "--method", "paper", "--region", "8", "--whole-image"},
           {kDump, "-o", out, "--method", "mean", "--diagnostics"},
-          {kDump, "-o", out, "--diagnostics"},
+          {kDump, "-o", out, "--diagnostics", "--band", "1/2"},
           {kDump, "-o", out, "--quality", "best"},
           {kDump, "-o", out, "--fireflies"},
           {kDump, "-o", out, "--fireflies", "burn"},

@@ -8,8 +8,8 @@
 #include <limits>
 #include <random>
 
+#include "reconstruct/common/gap_field.h"
 #include "reconstruct/common/picture_scale.h"
-#include "reconstruct/drift/gap_field.h"
 #include "variolux/dump/sample_buffer.h"
 #include "variolux/reconstruct/reconstruct.h"
 

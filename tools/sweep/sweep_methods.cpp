@@ -17,7 +17,8 @@ const std::vector<SweepMethod>& builtInMethods() {
         {.name = "krige-draft", .command = krige + "--method krige --quality draft"},
         {.name = "krige-standard",
          .command = krige + "--method krige --quality standard",
-         .hierarchical = true},
+         .hierarchical = true,
+         .inspectable = true},
         {.name = "krige-high", .command = krige + "--method krige --quality high"},
     };
     return methods;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "variolux/base/window.h"
@@ -92,8 +93,9 @@ enum class Fireflies {
 /// positions, and parts without samples are predicted; the windows grow by the scale. Memory depends on the
 /// picture's width, not its height. Every channel gets the same weights: parts that add up to R, G, B still
 /// do. A pixel without samples is predicted and counted; a sample with radiance that is not finite, or beyond
-/// 2^50, is left out and counted. reconstruct() throws Error when options name channels that the dump lacks, ask for a scale where
-/// it has no positions or for more bands than rows, and when maxMemory is too little, saying what would do.
+/// 2^50, is left out and counted. reconstruct() throws Error when options name channels that the dump lacks,
+/// ask for a scale where it has no positions or for more bands than rows, and when maxMemory is too little,
+/// saying what would do.
 struct Drift {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;
@@ -103,6 +105,12 @@ struct Drift {
     std::vector<std::string> features = {};  ///< further channels to use as drift
     /// Further channels, or layers (radianceChannels), to estimate with the same weights: light groups.
     std::vector<std::string> radiance = {};
+
+    /// Also measure what is left: DriftReport::residuals. Not with bands, which cut regions.
+    bool diagnostics = false;
+    /// Raster coordinates (x, y) of pixels of the image whose regions are to be inspected
+    /// (DriftReport::inspections), with `diagnostics`.
+    std::vector<std::pair<int, int>> inspect = {};
 
     int scale = 1;   ///< 1 to 4: pixels of the image along each axis for one of the dump
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit

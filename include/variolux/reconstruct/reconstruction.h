@@ -55,6 +55,22 @@ struct PaperReport {
     std::map<std::size_t, RegionInspection> inspections;   ///< of regions (by index) where it was asked for
 };
 
+/// What the default method left in one region of 32 x 32 pixels: the variogram of the residuals, from
+/// products of the two halves', in which noise cancels. Squared radiance, summed over R, G, B.
+struct ResidualRegion {
+    Window pixels;
+    std::int64_t data =
+        0;  ///< pixels with samples in both halves, and noise; below 100 there is no variogram
+    std::int64_t pairs = 0;  ///< at lags of 1 to 16 pixels
+    double nugget = 0;  ///< what single pixels lack, less what one half's weights know of the other's noise
+    double sill = 0;    ///< partial sill of the stable model
+    double range = 0;   ///< pixels
+    double exponent = 0;
+    double statistic = 0;  ///< of sillTest()
+    double pValue = 1;
+    bool structure = false;  ///< significant at 0.05: neighbouring pixels are wrong together
+};
+
 /// What the default method did.
 struct DriftReport {
     std::int64_t farPixels = 0;             ///< empty, and with no samples within 5 pixels either
@@ -72,6 +88,8 @@ struct DriftReport {
                                             ///< others are no drift
     double driftFunctions = 0;              ///< sum over neighbourhoods of the effective number of functions
     std::map<std::string, double> seconds;  ///< wall time by stage
+    std::vector<ResidualRegion> residuals;  ///< row by row; where asked for (Drift::diagnostics)
+    std::map<std::size_t, RegionInspection> inspections;  ///< of residuals (by index) where it was asked for
 };
 
 /// What a run did, for people and machines.
@@ -98,11 +116,12 @@ struct Reconstruction {
 std::string toText(const ReconstructionReport& report);
 std::string toJson(const ReconstructionReport& report);
 
-/// Of the paper's method: the report and all regions, what `vlx-krige --diagnostics` writes beside the image.
+/// Of the paper's method and the default: the report and all regions, what `vlx-krige --diagnostics` writes
+/// beside the image.
 std::string toJson(const Reconstruction& reconstruction);
 
-/// Of the paper's method: appends the layers diagnostics.nugget, .sill, .range, .exponent, .errorVariance,
-/// .outcome to the image, constant over each region.
+/// Appends the layers diagnostics.nugget, .sill, .range, .exponent, and of the paper's method .errorVariance,
+/// .outcome, of the default .pValue to the image, constant over each region.
 void addDiagnosticLayers(Reconstruction& reconstruction);
 
 }  // namespace vlx

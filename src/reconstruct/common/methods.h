@@ -8,6 +8,10 @@ namespace vlx {
 
 inline constexpr const char* kStddevChannels[] = {"stddev.R", "stddev.G", "stddev.B"};
 
+/// Throws Error when one of these pixels (x, y), to be inspected, is not in the window.
+void requireInside(const std::vector<std::pair<int, int>>& pixels, const Window& window,
+                   const std::string& path);
+
 Image driftOutline(const SampleSource& source, const Drift& method);
 
 ReconstructionReport reconstructDrift(const SampleSource& source, const Drift& method, const RowSink& sink,

@@ -122,6 +122,27 @@ nlohmann::ordered_json json(const RegionInspection& inspection) {
     return document;
 }
 
+nlohmann::ordered_json json(const RegionDiagnostics& r) {
+    return {{"outcome", name(r.outcome)},
+            {"data", r.data},
+            {"samples", r.samples},
+            {"nugget", r.nugget},
+            {"sill", r.sill},
+            {"range", r.range},
+            {"exponent", r.exponent},
+            {"errorVariance", r.errorVariance},
+            {"colourScale", r.colourScale},
+            {"condition", r.condition},
+            {"jitter", r.jitter},
+            {"inaccurate", r.inaccurate}};
+}
+
+nlohmann::ordered_json json(const ResidualRegion& r) {
+    return {{"data", r.data},           {"pairs", r.pairs},   {"nugget", r.nugget},
+            {"sill", r.sill},           {"range", r.range},   {"exponent", r.exponent},
+            {"statistic", r.statistic}, {"pValue", r.pValue}, {"structure", r.structure}};
+}
+
 std::string inWords(const PaperReport& report) {
     std::ostringstream text;
     bool first = true;
@@ -151,6 +172,10 @@ std::string inWords(const DriftReport& report) {
          << report.neighbourhoods << " neighbourhoods kriged, "
          << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
+    if (!report.residuals.empty())
+        text << std::ranges::count_if(report.residuals, [](const ResidualRegion& r) { return r.structure; })
+             << " of " << report.residuals.size()
+             << " regions have structure left in their residuals (5 % would by chance)\n";
     if (report.failedNeighbourhoods > 0)
         text << report.failedNeighbourhoods << " neighbourhoods fell back to their mean\n";
     return text.str();
@@ -201,49 +226,50 @@ std::string toJson(const ReconstructionReport& report) { return json(report).dum
 std::string toJson(const Reconstruction& reconstruction) {
     nlohmann::ordered_json document = {{"report", json(reconstruction.report)}};
     auto& regions = document["regions"] = nlohmann::ordered_json::array();
-    const PaperReport& paper = reconstruction.report.paper();
-    for (std::size_t i = 0; i < paper.regions.size(); ++i) {
-        const RegionDiagnostics& r = paper.regions[i];
-        regions.push_back({{"x", r.pixels.x},
-                           {"y", r.pixels.y},
-                           {"width", r.pixels.width},
-                           {"height", r.pixels.height},
-                           {"outcome", name(r.outcome)},
-                           {"data", r.data},
-                           {"samples", r.samples},
-                           {"nugget", r.nugget},
-                           {"sill", r.sill},
-                           {"range", r.range},
-                           {"exponent", r.exponent},
-                           {"errorVariance", r.errorVariance},
-                           {"colourScale", r.colourScale},
-                           {"condition", r.condition},
-                           {"jitter", r.jitter},
-                           {"inaccurate", r.inaccurate}});
-        if (const auto found = paper.inspections.find(i); found != paper.inspections.end())
-            regions.back()["inspection"] = json(found->second);
-    }
+    const auto add = [&](const auto& of, const auto& inspections) {
+        for (std::size_t i = 0; i < of.size(); ++i) {
+            const Window& w = of[i].pixels;
+            regions.push_back({{"x", w.x}, {"y", w.y}, {"width", w.width}, {"height", w.height}});
+            regions.back().update(json(of[i]));
+            if (const auto found = inspections.find(i); found != inspections.end())
+                regions.back()["inspection"] = json(found->second);
+        }
+    };
+    if (const auto* drift = std::get_if<DriftReport>(&reconstruction.report.method))
+        add(drift->residuals, drift->inspections);
+    else
+        add(reconstruction.report.paper().regions, reconstruction.report.paper().inspections);
     return document.dump(1);
 }
 
 void addDiagnosticLayers(Reconstruction& reconstruction) {
+    const auto* drift = std::get_if<DriftReport>(&reconstruction.report.method);
+    const std::vector<std::string> paperLayers = {"nugget",   "sill",          "range",
+                                                  "exponent", "errorVariance", "outcome"};
+    const std::vector<std::string> driftLayers = {"nugget", "sill", "range", "exponent", "pValue"};
     const Image& old = reconstruction.image;
     std::vector<std::string> channels = old.channels;
-    for (const char* layer : {"nugget", "sill", "range", "exponent", "errorVariance", "outcome"})
-        channels.push_back(std::string("diagnostics.") + layer);
+    for (const std::string& layer : drift ? driftLayers : paperLayers)
+        channels.push_back("diagnostics." + layer);
     Image image(old.data, channels);
     image.display = old.display;
     for (int row = 0; row < image.data.height; ++row)
         for (int col = 0; col < image.data.width; ++col)
             std::copy_n(old.at(col, row), old.channelCount(), image.at(col, row));
-    for (const RegionDiagnostics& r : reconstruction.report.paper().regions)
-        for (int row = r.pixels.y; row < r.pixels.y + r.pixels.height; ++row)
-            for (int col = r.pixels.x; col < r.pixels.x + r.pixels.width; ++col) {
+    const auto fill = [&](const Window& pixels, std::initializer_list<double> of) {
+        for (int row = pixels.y; row < pixels.y + pixels.height; ++row)
+            for (int col = pixels.x; col < pixels.x + pixels.width; ++col) {
                 float* values = image.at(col - image.data.x, row - image.data.y) + old.channelCount();
-                for (const double value :
-                     {r.nugget, r.sill, r.range, r.exponent, r.errorVariance, static_cast<double>(r.outcome)})
-                    *values++ = static_cast<float>(value);
+                for (const double value : of) *values++ = static_cast<float>(value);
             }
+    };
+    if (drift)
+        for (const ResidualRegion& r : drift->residuals)
+            fill(r.pixels, {r.nugget, r.sill, r.range, r.exponent, r.pValue});
+    else
+        for (const RegionDiagnostics& r : reconstruction.report.paper().regions)
+            fill(r.pixels,
+                 {r.nugget, r.sill, r.range, r.exponent, r.errorVariance, static_cast<double>(r.outcome)});
     reconstruction.image = std::move(image);
 }
 

@@ -11,6 +11,7 @@
 #include "reconstruct/drift/half_resolution.h"
 #include "reconstruct/drift/level.h"
 #include "reconstruct/drift/pixel_data.h"
+#include "reconstruct/drift/residual_field.h"
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
 #include "variolux/base/parallel.h"
@@ -110,6 +111,9 @@ class Pipeline {
         rows_ = Image({0, 0, width_, kept(kTile)},
                       std::vector<std::string>(static_cast<std::size_t>(radiance_ + 3)));
         startAbove(firstRow_);
+        if (options.diagnostics)
+            residuals_.emplace(width_, height_, window, options.inspect, fine_.rows(),
+                               halved_ ? corrected_ : fine_.rows().combined, radiance_);
     }
 
     ReconstructionReport run() {
@@ -312,6 +316,7 @@ class Pipeline {
             imageLight_ += of.image;
             lightNoise_ += of.noise;
         }
+        for (int y = finishedRows_; y < until && residuals_; ++y) residuals_->addRow(y, drift_);
         clock_.addTo("finishing");
         sink_(rows_.pixels.data(), until - finishedRows_);
         finishedRows_ = until;
@@ -339,6 +344,7 @@ class Pipeline {
     std::unique_ptr<Correction> correction_;
     RowRing clean_, light_;
     Finishing finishing_;
+    std::optional<ResidualField> residuals_;
     int firstRow_ = 0, endRow_ = 0;  // of the band
     int gatheredRows_ = 0, filledRows_ = 0, differenceRows_ = 0, correctedRows_ = 0, cleanRows_ = 0,
         finishedRows_ = 0;
@@ -356,6 +362,7 @@ std::optional<std::string> Drift::validate() const {
     if (band.count < 1 || band.index < 0 || band.index >= band.count)
         return "expected a band from 1 to " + std::to_string(band.count) + ", found " +
                std::to_string(band.index + 1);
+    if (diagnostics && band.count > 1) return "expected no band with diagnostics: regions would be cut";
     if (fireflies == Fireflies::Clamp && !(clamp > 0 && std::isfinite(clamp)))
         return "expected a luminance above 0 to clamp at, found " + std::to_string(clamp);
     return std::nullopt;
@@ -369,6 +376,7 @@ Image driftOutline(const SampleSource& dump, const Drift& options) {
         throw Error(dump.path(), "expected at least as many rows as bands, found " +
                                      std::to_string(dump.header().data.height * options.scale) +
                                      " rows and " + std::to_string(options.band.count) + " bands");
+    requireInside(options.inspect, image.data, dump.path());
     image.display = scaled(dump.header().display, options.scale);
     image.channels = {"R", "G", "B"};
     if (findChannel(dump.header(), "A") >= 0) image.channels.emplace_back("A");

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <memory>
 
+#include "reconstruct/common/gap_field.h"
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/pixel_statistics.h"
-#include "reconstruct/drift/gap_field.h"
 
 /// From gathered statistics to the data that are kriged: means of the halves without fireflies, holes filled.
 namespace vlx {

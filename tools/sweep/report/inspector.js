@@ -185,5 +185,5 @@ function drawRegion(region) {
     point.append(title);
     chart.svg.append(point);
   }
-  $('variogram').replaceChildren(chart.svg, make('p', { class: 'note' }, 'Grey: the cloud (pairs of data, less their noise; points outside the frame are left out). Squares: the empirical variogram with one standard error. Line: the fitted model.'));
+  $('variogram').replaceChildren(chart.svg, make('p', { class: 'note' }, (inspection.cloud.length ? 'Grey: the cloud (pairs of data, less their noise; points outside the frame are left out).' : 'Of what the estimate lacks: products of the two halves\u2019 residuals, in which noise cancels.') + ' Squares: the empirical variogram with one standard error. Line: the fitted model.'));
 }

@@ -1,4 +1,4 @@
-#include "reconstruct/drift/gap_field.h"
+#include "reconstruct/common/gap_field.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,187 @@
+#include "reconstruct/drift/residual_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "variolux/base/parallel.h"
+#include "variolux/geostat/variogram_fit.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr int kLags[] = {1, 2, 3, 4, 6, 8, 12, 16};  // pixels: half a region at most
+constexpr int kClasses = static_cast<int>(std::size(kLags));
+constexpr std::int64_t kFewestData = 100;
+constexpr double kMinExponent = 0.5;
+
+/// A mean of products, and the variance of that mean were they independent.
+struct MeanProduct {
+    double sum = 0, squares = 0;
+    std::int64_t pairs = 0;
+
+    void add(double product) {
+        if (!std::isfinite(product)) return;
+        sum += product;
+        squares += product * product;
+        ++pairs;
+    }
+    double mean() const { return pairs > 0 ? sum / static_cast<double>(pairs) : 0; }
+    double variance() const {
+        const auto n = static_cast<double>(pairs);
+        return pairs > 0 ? squares / (n * n) : 0;
+    }
+};
+
+}  // namespace
+
+ResidualField::ResidualField(int width, int height, const Window& image,
+                             std::vector<std::pair<int, int>> inspect, const LevelRows& level,
+                             const RowRing& combined, int radiance)
+    : width_(width),
+      height_(height),
+      image_(image),
+      inspect_(std::move(inspect)),
+      data_(level.data),
+      variances_(level.variances),
+      combined_(combined),
+      planes_{radiance},
+      combinedPlanes_{radiance} {
+    for (int c = 0; c < 3; ++c)
+        for (auto* plane : {&residuals_[0][c], &residuals_[1][c], &noise_[c]})
+            plane->resize(static_cast<std::size_t>(width) * kSide);
+}
+
+void ResidualField::addRow(int y, DriftReport& report) {
+    const auto row = static_cast<std::size_t>(y - first_) * static_cast<std::size_t>(width_);
+    for (int x = 0; x < width_; ++x)
+        for (int c = 0; c < 3; ++c) {
+            const std::size_t at = row + static_cast<std::size_t>(x);
+            const double variance = variances_.row(c, y)[x];
+            double noise = 0;
+            for (int half = 0; half < 2; ++half) {
+                const double n = data_.row(planes_.halfCount(half), y)[x];
+                const double apart = static_cast<double>(data_.row(planes_.mean(half) + c, y)[x]) -
+                                     static_cast<double>(combined_.row(combinedPlanes_.half(half) + c, y)[x]);
+                const bool datum = n > 0 && variance > 0;
+                noise += datum ? variance / n / 2 : std::numeric_limits<double>::quiet_NaN();
+                residuals_[half][c][at] = datum ? static_cast<float>(apart / std::sqrt(variance / n))
+                                                : std::numeric_limits<float>::quiet_NaN();
+            }
+            noise_[c][at] = static_cast<float>(noise);
+        }
+    if (y + 1 < std::min(height_, first_ + kSide)) return;
+    finishRegions(report);
+    first_ = y + 1;
+}
+
+void ResidualField::finishRegions(DriftReport& report) {
+    const int rows = std::min(kSide, height_ - first_), regions = (width_ + kSide - 1) / kSide;
+    struct Result {
+        ResidualRegion region;
+        RegionInspection inspection;
+    };
+    std::vector<Result> results(static_cast<std::size_t>(regions));
+    parallelFor(0, regions, [&](std::int64_t number) {
+        auto& [region, inspection] = results[static_cast<std::size_t>(number)];
+        const int left = static_cast<int>(number) * kSide, columns = std::min(kSide, width_ - left);
+        region.pixels = {image_.x + left, image_.y + first_, columns, rows};
+        const auto at = [&](int x, int y) {
+            return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                   static_cast<std::size_t>(left + x);
+        };
+        MeanProduct none, lags[kClasses];
+        double noise = 0;
+        const auto product = [&](std::size_t p, std::size_t q) {
+            double sum = 0;
+            for (int c = 0; c < 3; ++c)
+                sum += (static_cast<double>(residuals_[0][c][p]) * static_cast<double>(residuals_[1][c][q]) +
+                        static_cast<double>(residuals_[0][c][q]) * static_cast<double>(residuals_[1][c][p])) /
+                       2;
+            return sum;
+        };
+        for (int y = 0; y < rows; ++y)
+            for (int x = 0; x < columns; ++x) {
+                const std::size_t p = at(x, y);
+                const std::int64_t before = none.pairs;
+                none.add(product(p, p));
+                if (none.pairs == before) continue;
+                for (int c = 0; c < 3; ++c) noise += static_cast<double>(noise_[c][p]);
+                for (int k = 0; k < kClasses; ++k) {
+                    if (x + kLags[k] < columns) lags[k].add(product(p, at(x + kLags[k], y)));
+                    if (y + kLags[k] < rows) lags[k].add(product(p, at(x, y + kLags[k])));
+                }
+            }
+        region.data = none.pairs;
+        inspection.neighbourhood = region.pixels;
+        inspection.distance = "pixels";
+        if (none.pairs < kFewestData) {
+            inspection.fallbacks = {"too few pixels with samples in both halves and noise"};
+            return;
+        }
+        const double unit =
+            noise / static_cast<double>(none.pairs) / 3;  // products are sums over three colours
+        EmpiricalVariogram variogram;
+        std::vector<double> errors;
+        double shift = 0;
+        for (int k = 0; k < kClasses; ++k) {
+            if (lags[k].pairs == 0) continue;
+            const double semivariance = unit * (none.mean() - lags[k].mean());
+            errors.push_back(unit * std::sqrt(none.variance() + lags[k].variance()));
+            variogram.bins.push_back({.lower = k > 0 ? static_cast<double>(kLags[k - 1]) : 0,
+                                      .upper = static_cast<double>(kLags[k]),
+                                      .pairs = static_cast<double>(lags[k].pairs),
+                                      .distance = static_cast<double>(kLags[k]),
+                                      .semivariance = semivariance,
+                                      .noise = 0,
+                                      .standardError = errors.back()});
+            region.pairs += lags[k].pairs;
+            shift = std::max(shift, -2 * semivariance);
+        }
+        inspection.pairs = region.pairs;
+        inspection.classes = variogram.bins;
+        const auto classes = static_cast<Eigen::Index>(errors.size());
+        variogram.data = none.pairs;
+        variogram.nullError = Eigen::Map<const Eigen::VectorXd>(errors.data(), classes);
+        variogram.nullCorrelation.resize(classes, classes);  // by what they share, C(0)
+        for (Eigen::Index a = 0; a < classes; ++a)
+            for (Eigen::Index b = 0; b < classes; ++b)
+                variogram.nullCorrelation(a, b) =
+                    a == b
+                        ? 1
+                        : unit * unit * none.variance() / (variogram.nullError[a] * variogram.nullError[b]);
+        // The fit knows no negative nugget: all classes are raised for it, which changes nothing else.
+        for (VariogramBin& bin : variogram.bins) bin.semivariance += shift;
+        FitOptions options;
+        options.structures = {
+            {.type = StructureType::Stable, .maxRange = kSide, .minShape = kMinExponent, .maxShape = 2}};
+        options.search = FitSearch::Fast;
+        const VariogramFit fit = fitVariogram(variogram, options);
+        region.statistic = fit.sillTest.statistic;
+        region.pValue = fit.sillTest.pValue;
+        region.structure = fit.sillTest.significant;
+        if (!fit.ok()) {
+            inspection.fallbacks.push_back(fit.message());
+            return;
+        }
+        inspection.model = fit.model;
+        inspection.model.nugget -= shift;
+        const VariogramStructure& stable = fit.model.structures.front();
+        region.nugget = inspection.model.nugget;
+        region.sill = stable.sill;
+        region.range = stable.range;
+        region.exponent = stable.shape;
+        if (!region.structure)
+            inspection.fallbacks.push_back("no structure: the variogram is flat but for noise");
+    });
+    for (Result& result : results) {
+        const Window& w = result.region.pixels;
+        if (std::ranges::any_of(inspect_,
+                                [&](const auto& pixel) { return w.contains(pixel.first, pixel.second); }))
+            report.inspections[report.residuals.size()] = std::move(result.inspection);
+        report.residuals.push_back(result.region);
+    }
+}
+
+}  // namespace vlx
