@@ -109,7 +109,8 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
     app.add_option(
            "--band", o.band,
            "krige: only band I of N, cut by rows from the top: the same pixels, bit for bit, that the "
-           "whole image has there, with its display window")
+           "whole image has there, with its display window (not with --filter or --diagnostics, which need "
+           "it whole)")
         ->option_text("I/N");
     app.add_option("--sampling-map", o.samplingMap,
                    "Also write where more samples would lower the error most: an EXR image with channel "
@@ -133,10 +134,10 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
         "nugget, "
         "sill, range, exponent and what was made of it; with krige, of what the estimate lacks, region by "
         "region, and whether that has any structure");
-    app.add_option(
-           "--inspect", o.inspect,
-           "With --diagnostics: put the variogram cloud, its classes and cross-validation of the region "
-           "of this pixel into OUTPUT.json; repeatable")
+    app.add_option("--inspect", o.inspect,
+                   "With --diagnostics: put the classes and the fitted curve of the variogram of the region "
+                   "of this pixel "
+                   "into OUTPUT.json, with paper its cloud and cross-validation, too; repeatable")
         ->option_text("X,Y")
         ->take_all()
         ->expected(1);
@@ -151,7 +152,7 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
            "--max-memory", o.maxMemory,
            "krige: memory of the process at most, for example 2G or 500M (10^9, 10^6 bytes): fewer rows "
            "are read at a time, and less than a picture of that width needs (170M or more) is refused. The "
-           "result does not depend on it")
+           "result does not depend on it (not with --filter, --sampling-map or --diagnostics)")
         ->option_text("SIZE");
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
         ->check(CLI::Range(0, 1024))

@@ -131,7 +131,8 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
         if (o.json) std::printf("{\"skipped\": true}\n");
         return;
     }
-    { const vlx::OutputFile writable(o.image); }  // found out now, not after the work
+    for (const std::string& output : outputs)
+        const vlx::OutputFile writable(output);  // found out now, not after the work
     const std::unique_ptr<vlx::SampleSource> source = openInput(o, flat);
     const bool usesPositions =
         o.method == vlx::KrigeMethod::Paper || o.krige.scale > 1 || o.filter != vlx::PixelFilter::Box;

@@ -130,6 +130,8 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
         Imf::Header beauty = common;
         beauty.setName("beauty");
         beauty.setType(Imf::SCANLINEIMAGE);
+        // Only deep parts need it, but OpenEXRCore (3.1) asks for it in every part of a file that has one.
+        beauty.setVersion(1);
         for (const auto& name : beautyChannels(dump))
             beauty.channels().insert(name, Imf::Channel(Imf::FLOAT));
 
@@ -159,6 +161,7 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
         if (dump.splatReplicates > 0) {
             splats.setName("splats");
             splats.setType(Imf::SCANLINEIMAGE);
+            splats.setVersion(1);
             for (const auto& name : splatChannels(dump.splatReplicates))
                 splats.channels().insert(name, Imf::Channel(Imf::FLOAT));
             splats.insert(kSplatReplicates, Imf::IntAttribute(dump.splatReplicates));

@@ -7,6 +7,7 @@
 
 #include "../base/temporary_folder.h"
 #include "variolux/base/error.h"
+#include "variolux/base/luminance.h"
 #include "variolux/base/parallel.h"
 #include "variolux/dump/reader.h"
 #include "variolux/dump/writer.h"
@@ -366,6 +367,17 @@ TEST_F(DriftKriging, FirefliesAsAskedFor) {
     EXPECT_EQ(kept.report.drift().limitedSamples, 0);
     EXPECT_EQ(kept.report.drift().energyRemoved, 0);
     EXPECT_EQ(clamped.report.drift().limitedSamples, 1);
+    const auto light = [](const Image& image) {
+        double sum = 0;
+        for (int y = 0; y < image.data.height; ++y)
+            for (int x = 0; x < image.data.width; ++x) {
+                const float* z = image.at(x, y);
+                sum += luminance<double>(z[0], z[1], z[2]);
+            }
+        return sum;
+    };
+    for (const Reconstruction* of : {&robust, &kept, &clamped})
+        EXPECT_NEAR(of->report.drift().light, light(of->image) / light(mean()), 1e-3);
     EXPECT_GT(plain - total(robust.image), 400);  // 5000 / 8 of light, gone
 }
 

@@ -445,6 +445,49 @@ TEST(NeverSure, NoFunctionIsFollowedBeyondTheData) {
             ASSERT_LT(image.at(x, y)[0], 1.5 * static_cast<double>(brightest)) << x << " " << y;
 }
 
+// Eight pixels across are all that is known of a picture: nobody knows what is elsewhere.
+TEST(NeverSure, OneClusterOfSamplesSaysLittleOfTheRest) {
+    for (const unsigned seed : {3u, 4u, 7u}) {
+        const SampleBuffer dump =
+            picture(64, {"R", "G", "B"}, seed, [](int x, int y, Random& random, auto& samples) {
+                if (x < 8 || x >= 16 || y < 8 || y >= 16) return;
+                std::exponential_distribution<float> light(2);
+                samples.push_back({light(random), light(random), light(random)});
+            });
+        for (const Quality quality : {Quality::Draft, Quality::Standard}) {
+            const Image image = reconstruct(dump, Drift{.quality = quality}).image;
+            for (const auto& [x, y] : {std::pair{25, 12}, {40, 12}, {60, 60}, {12, 40}})
+                for (int c = 0; c < 3; ++c)
+                    EXPECT_GT(deviation(image, x, y, c), 0.1) << x << " " << y << " " << seed;
+        }
+    }
+}
+
+// One sample of many saw light: the picture around it is not a hundred times surer than one that saw none.
+TEST(NeverSure, AFireflyInTheDarkIsNotForgotten) {
+    const auto dump = [](float bright) {
+        return picture(48, {"R", "G", "B"}, 1, [bright](int x, int y, Random&, auto& samples) {
+            for (int s = 0; s < 4; ++s) {
+                const float z = x == 24 && y == 24 && s == 2 ? bright : 0.f;
+                samples.push_back({z, z, z});
+            }
+        });
+    };
+    const Reconstruction seen = reconstruct(dump(100), Drift{});
+    EXPECT_GT(deviation(seen.image, 24, 24), 0.01);  // the samples' mean over the window is 0.02
+    EXPECT_GT(deviation(seen.image, 5, 24), 5e-6);
+    // Of one sample of 9,216 the sum is known to a standard error of itself.
+    EXPECT_NEAR(seen.report.drift().lightError, 1, 1e-3);
+}
+
+TEST(NeverSure, ImagesOfTinyValuesHaveErrorsToo) {
+    const SampleBuffer dump = picture(24, {"R", "G", "B"}, 1, [](int, int, Random& random, auto& samples) {
+        std::normal_distribution<float> noise(1e-30f, 1e-31f);
+        for (int s = 0; s < 4; ++s) samples.push_back({noise(random), noise(random), noise(random)});
+    });
+    EXPECT_GT(least(reconstruct(dump, Drift{}).image, "stddev.R"), 0);
+}
+
 // Squares of radiance beyond 1e19 are no floats: such samples are dropped as if they were not finite.
 TEST(NeverSure, RadianceBeyondAllLightCostsItsSamplesOnly) {
     for (const float wild : {1e14f, 2e15f, 1e19f, 1e30f, 3e38f, -1e30f})

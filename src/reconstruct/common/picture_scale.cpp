@@ -18,7 +18,8 @@ class Sums {
     explicit Sums(int width) {
         for (int lag = 1; lag < width; lag *= 2) lags_.push_back(lag);
         pairs_.resize(lags_.size());
-        for (auto& products : products_) products.resize(lags_.size());
+        for (auto* sums : {products_, squaredProducts_})
+            for (int c = 0; c < 3; ++c) sums[c].resize(lags_.size());
     }
 
     void add(const RowRing& row, const GatheredPlanes& planes, int width) {
@@ -41,9 +42,12 @@ class Sums {
                 const int to = x + lags_[k];
                 if (to >= width || at(planes.count(), to) == 0) continue;
                 ++pairs_[k];
-                for (int c = 0; c < 3; ++c)
-                    products_[c][k] +=
+                for (int c = 0; c < 3; ++c) {
+                    const double product =
                         (half(0, c, to) - half(0, c, x)) * (half(1, c, to) - half(1, c, x)) / 2;
+                    products_[c][k] += product;
+                    squaredProducts_[c][k] += product * product;
+                }
             }
         }
     }
@@ -64,7 +68,11 @@ class Sums {
             }
             double most = 0;
             for (std::size_t k = 0; k < lags_.size(); ++k) {
-                if (pairs_[k] > 0) most = std::max(most, products_[c][k] / pairs_[k]);
+                // Few pairs may be alike by chance: not less than a standard error. None: the light itself.
+                const double known =
+                    pairs_[k] > 0 ? std::max(products_[c][k], std::sqrt(squaredProducts_[c][k])) / pairs_[k]
+                                  : scale.level * scale.level;
+                most = std::max(most, known);
                 scale.semivariance[c].push_back(most);
             }
             double variance = 0;
@@ -80,7 +88,7 @@ class Sums {
 
   private:
     std::vector<int> lags_;
-    std::vector<double> pairs_, products_[3];
+    std::vector<double> pairs_, products_[3], squaredProducts_[3];
     double radiance_[3] = {}, squares_[3] = {}, samples_ = 0, freedom_ = 0;
 };
 

@@ -21,8 +21,9 @@ struct PictureScale {
     /// no pixel has two samples. Above 0.
     double variance[3] = {1, 1, 1};
     /// Semivariances of R, G, B at lags of 1, 2, 4, ... pixels along rows, not decreasing: half the mean
-    /// product of what the two halves' means differ by, in which noise cancels; half the mean square where
-    /// pixels have but one sample. The last is the field's spread.
+    /// product of what the two halves' means differ by, in which noise cancels (half the mean square where
+    /// pixels have but one sample), but no less than a standard error of that; level^2 at lags that no two
+    /// pixels with samples have. The last is the field's spread.
     std::vector<double> semivariance[3];
 
     /// 1 / the sum of the variances.

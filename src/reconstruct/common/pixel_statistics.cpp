@@ -217,7 +217,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
 
         std::fill(square.begin(), square.end(), 0.0);
         for (auto& s : sum) s.assign(radiance + features, 0.0);
-        double rgb[3] = {};
+        double rgb[3] = {}, light = 0, lightSquares = 0;
         std::size_t bright = 0;
         float most = -1, second = -1;
         int brightHalf = 0;
@@ -234,6 +234,9 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
                 const double brightness = luminance(rgb);
                 const double factor = clamp > 0 && brightness > clamp ? clamp / brightness : 1;
                 counts.luminance += brightness;
+                const double signedLight = luminance(rgb[0], rgb[1], rgb[2]);
+                light += signedLight;
+                lightSquares += signedLight * signedLight;
                 counts.removed += brightness * (1 - factor);
                 counts.limited += factor < 1;
                 for (std::size_t c = 0; c < radiance + features; ++c) {
@@ -252,6 +255,8 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
                 }
             }
 
+        counts.light += light;
+        if (n > 1) counts.noise += std::max(0.0, lightSquares - light * light / n) * n / (n - 1);
         const bool known = varianceKnown(band, layout, taken);
         const auto put = [&](int plane, double v) { ring.row(plane, y)[x] = static_cast<float>(v); };
         const auto nA = static_cast<double>(halves[0].size());

@@ -51,7 +51,9 @@ float saturated(float value);
 struct GatherCounts {
     std::int64_t samples = 0, dropped = 0, empty = 0;
     std::int64_t limited = 0;           ///< samples made darker by the firefly estimator
-    double luminance = 0, removed = 0;  ///< sums over samples
+    double luminance = 0, removed = 0;  ///< sums over samples; nothing is darker than black
+    double light = 0;                   ///< the same sum of what may be negative, too
+    double noise = 0;                   ///< variance of `light`, of pixels with two samples or more
 };
 
 /// Gathers one row (counted from the band's top) into planes of row y.

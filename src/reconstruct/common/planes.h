@@ -137,9 +137,11 @@ struct LightPlanes {
     static constexpr int missing(int window) { return 7 * window; }     ///< R, G, B
     static constexpr int room(int window) { return 7 * window + 3; }    ///< R, G, B
     static constexpr int square(int window) { return 7 * window + 6; }  ///< of what is missing
-    static constexpr int kLost = 14;   ///< squares of what fireflies lost, near
-    static constexpr int kLight = 15;  ///< that is there, near
-    static constexpr int kChannels = 16;
+    static constexpr int kLost = 14;     ///< squares of what fireflies lost, near
+    static constexpr int kLight = 15;    ///< that is there, and what fireflies lost, near
+    static constexpr int kAllLost = 16;  ///< what fireflies lost, near
+    static constexpr int kPixels = 17;   ///< near
+    static constexpr int kChannels = 18;
 
     static constexpr bool isSquare(int plane) {
         return plane == square(0) || plane == square(1) || plane == kLost;

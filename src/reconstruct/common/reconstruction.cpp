@@ -163,7 +163,8 @@ std::string inWords(const DriftReport& report) {
     constexpr double kMuchLight = 0.1;
     std::ostringstream text;
     text << report.limitedSamples << " fireflies limited, " << 100 * report.energyRemoved
-         << " % of the light removed, " << 100 * report.energyReturned << " % given back"
+         << " % of the light removed; " << 100 * report.energyReturned
+         << " % given back where samples have more than the estimate"
          << (report.energyRemoved - report.energyReturned > kMuchLight
                  ? " (WARNING: much; where few samples find the light, --fireflies keep keeps it)\n"
                  : "\n")

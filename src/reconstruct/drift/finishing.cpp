@@ -13,6 +13,9 @@ namespace vlx {
 
 namespace {
 
+// Squares of what is smaller than 1e-19 are no floats: nobody is sure of it for that.
+constexpr double kLeastVariance = std::numeric_limits<float>::min();
+
 /// Alpha as compositing needs it: within 0 to 1, and what differs from either by rounding is that.
 double coverage(double alpha) {
     constexpr double kRounding = 1e-5;
@@ -173,11 +176,11 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             const double variance =
                 static_cast<double>(clean_.row(cleanPlanes_.variance() + c, y)[x]) - gapVariance(c, x, y);
             moved[c] =
-                Light::step(shares.moved[c][i], value, std::sqrt(std::max(0.0, variance)), shares.lost[i]);
+                Light::step(shares.moved[c][i], value, variance, Light::lostVariance(shares, i, value));
             all += moved[c];
             light += std::max(0.0, value);
         }
-        double samples[3] = {}, image[3] = {};
+        double image[3] = {};
         for (int c = 0; c < radiance_; ++c) {
             const double mean = plainMean(data_, planes_, c, x, y);
             double value = clean_.row(c, y)[x];
@@ -193,21 +196,21 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             const double chosen = exact ? mean : value;
             out[c] = static_cast<float>(mean + strength * (chosen - mean));
             if (c >= 3) continue;
-            samples[c] = mean + static_cast<double>(data_.row(planes_.removed() + c, y)[x]);
             image[c] = out[c];
             const double variance = static_cast<double>(clean_.row(cleanPlanes_.variance() + c, y)[x]) +
-                                    moved[c] * moved[c] + Light::lostVariance(shares.lost[i], value);
-            out[radiance_ + c] = static_cast<float>(
-                exact ? 0 : std::sqrt(strength * variance + (1 - strength) * meanVariance(c, x, y)));
+                                    moved[c] * moved[c] + Light::lostVariance(shares, i, value);
+            out[radiance_ + c] =
+                static_cast<float>(exact ? 0
+                                         : std::sqrt(strength * std::max(kLeastVariance, variance) +
+                                                     (1 - strength) * meanVariance(c, x, y)));
         }
         if (n == 0) continue;
         if (!exact) counts.moved += n * strength * luminance(moved[0], moved[1], moved[2]);
-        counts.samples += luminance(samples[0], samples[1], samples[2]);
-        counts.image += luminance(image[0], image[1], image[2]);
+        counts.image += n * luminance(image[0], image[1], image[2]);
         // Colours of a sample go together.
         const double noise = luminance(std::sqrt(meanVariance(0, x, y)), std::sqrt(meanVariance(1, x, y)),
                                        std::sqrt(meanVariance(2, x, y)));
-        counts.noise += noise * noise;
+        counts.noise += n * n * noise * noise;
     }
     return counts;
 }

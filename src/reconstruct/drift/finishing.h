@@ -30,9 +30,8 @@ class Finishing {
     struct Counts {
         std::int64_t exact = 0;  ///< pixels
         double moved = 0;        ///< luminance given back, summed over samples
-        // Of pixels with samples: luminance of the samples' means, of the image, and the first one's
-        // variance.
-        double samples = 0, image = 0, noise = 0;
+        double image = 0;        ///< luminance of the image, summed over samples
+        double noise = 0;        ///< variance of the same sum of the samples' own luminance
     };
     /// Row y of the picture: radiance channels and stddev of R, G, B, interleaved. Rows of LightReach::kNear
     /// around it are there.

@@ -40,12 +40,13 @@ Light::Row::Row(int width) {
 
 void Light::sumRow(int y, const Row& row) {
     const auto w = static_cast<std::size_t>(width_);
-    std::vector<float> squares(w), lost(w), light(w), room(w);
+    std::vector<float> squares(w), lost(w), all(w), light(w), room(w);
     for (int c = 0; c < 3; ++c) {
         for (std::size_t i = 0; i < w; ++i) {
             squares[i] += row.missing[c][i] * row.missing[c][i];
             lost[i] += row.lost[c][i] * row.lost[c][i];
-            light[i] += std::max(0.f, row.value[c][i]);
+            all[i] += row.lost[c][i];
+            light[i] += std::max(0.f, row.value[c][i]) + row.lost[c][i];
             room[i] = static_cast<float>(Light::room(row.value[c][i], row.deviation[c][i]));
         }
         for (const auto& [window, reach] : {std::pair{0, LightReach::kNear}, {1, LightReach::kWide}}) {
@@ -57,6 +58,8 @@ void Light::sumRow(int y, const Row& row) {
     sumAround(squares, LightReach::kWide, true, sums_.row(LightPlanes::square(1), y));
     sumAround(lost, LightReach::kNear, true, sums_.row(LightPlanes::kLost, y));
     sumAround(light, LightReach::kNear, false, sums_.row(LightPlanes::kLight, y));
+    sumAround(all, LightReach::kNear, false, sums_.row(LightPlanes::kAllLost, y));
+    sumAround(std::vector<float>(w, 1.f), LightReach::kNear, false, sums_.row(LightPlanes::kPixels, y));
 }
 
 Light::Shares Light::shares(int y) const {
@@ -75,6 +78,7 @@ Light::Shares Light::shares(int y) const {
     Shares result;
     for (auto& plane : result.moved) plane.resize(w);
     result.lost.resize(w);
+    result.lostLevel.resize(w);
     for (std::size_t i = 0; i < w; ++i) {
         const auto at = [&](int plane) { return sums[static_cast<std::size_t>(plane) * w + i]; };
         double moved[3] = {};
@@ -94,6 +98,7 @@ Light::Shares Light::shares(int y) const {
         for (int c = 0; c < 3; ++c) result.moved[c][i] = moved[c];
         const double light = at(LightPlanes::kLight);
         if (light > 0) result.lost[i] = at(LightPlanes::kLost) / (light * light);
+        result.lostLevel[i] = at(LightPlanes::kAllLost) / at(LightPlanes::kPixels) / 3;
     }
     return result;
 }

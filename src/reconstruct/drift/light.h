@@ -42,22 +42,27 @@ class Light {
     };
     /// Row y of the sums (LightPlanes).
     void sumRow(int y, const Row& row);
-    /// l of R, G, B, pixel by pixel of row y; last, the variance of what fireflies lost, sum g^2 r^2, as a
-    /// share of the light's square: it is known to as many samples as lost it. Rows kNear around it are
-    /// summed.
+    /// l of R, G, B, pixel by pixel of row y. Then the variance of what fireflies lost, r a pixel, sum g^2
+    /// r^2, as a share of the square of the light, sum g (y + r): it is known to as many samples as lost it;
+    /// and what they lost a pixel and colour. Rows kNear around it are summed.
     struct Shares {
-        std::vector<double> moved[3], lost;
+        std::vector<double> moved[3], lost, lostLevel;
     };
     Shares shares(int y) const;
 
-    /// By what a pixel of value y and standard deviation s moves, of l. `lost`: of Shares.
-    static double step(double l, double value, double deviation, double lost) {
-        if (!(value > 0 && deviation > 0)) return 0;
-        const double most = std::min(value, std::sqrt(deviation * deviation + lostVariance(lost, value)));
-        return std::clamp(l * room(value, deviation), -most, most);
+    /// Variance of what fireflies lost of a pixel of value y: in proportion to y, and to what they lost
+    /// around it, which may be all the light there is; thrice, as what few have lost may be missing
+    /// elsewhere.
+    static double lostVariance(const Shares& of, std::size_t x, double value) {
+        const double light = std::max(0.0, value) + of.lostLevel[x];
+        return 3 * of.lost[x] * light * light;
     }
-    /// Of what fireflies around a pixel lost: as many as r^2 are few, and have not been met as often.
-    static double lostVariance(double lost, double value) { return 3 * lost * value * value; }
+    /// By what a pixel of value y moves, of l; s^2: its error variance, `lost` that of lost light.
+    static double step(double l, double value, double variance, double lost) {
+        if (!(value > 0 && variance > 0)) return 0;
+        const double most = std::min(value, std::sqrt(variance + lost));
+        return std::clamp(l * room(value, std::sqrt(variance)), -most, most);
+    }
 
   private:
     /// a

@@ -127,7 +127,8 @@ class Pipeline {
         }
         if (samplesLight_ > 0) {
             drift_.light = imageLight_ / samplesLight_;
-            drift_.lightError = std::sqrt(lightNoise_) / samplesLight_;
+            // Of the samples as they came; where pixels have one sample, what their neighbours say of it.
+            drift_.lightError = std::sqrt(std::max(sampleNoise_, lightNoise_)) / samplesLight_;
         }
         for (const auto& [stage, seconds] : drift_.seconds)
             (stage == "read" ? report_.readSeconds : report_.solveSeconds) += seconds;
@@ -238,6 +239,8 @@ class Pipeline {
                 drift_.limitedSamples += of.limited;
                 luminance_ += of.luminance;
                 removed_ += of.removed;
+                samplesLight_ += of.light;
+                sampleNoise_ += of.noise;
             }
             gatheredRows_ += rows;
             clock_.addTo("statistics");
@@ -312,7 +315,6 @@ class Pipeline {
         for (const Finishing::Counts& of : counts) {
             drift_.exactPixels += of.exact;
             returned_ += of.moved;
-            samplesLight_ += of.samples;
             imageLight_ += of.image;
             lightNoise_ += of.noise;
         }
@@ -349,8 +351,9 @@ class Pipeline {
     int gatheredRows_ = 0, filledRows_ = 0, differenceRows_ = 0, correctedRows_ = 0, cleanRows_ = 0,
         finishedRows_ = 0;
     double luminance_ = 0, removed_ = 0, returned_ = 0;
-    double samplesLight_ = 0, imageLight_ = 0, lightNoise_ = 0;  // Finishing::Counts
-    Image rows_;                                                 // finished, on their way out
+    double samplesLight_ = 0, sampleNoise_ = 0;  // GatherCounts
+    double imageLight_ = 0, lightNoise_ = 0;     // Finishing::Counts
+    Image rows_;                                 // finished, on their way out
 };
 
 }  // namespace
@@ -372,7 +375,7 @@ Image driftOutline(const SampleSource& dump, const Drift& options) {
     check(dump, options);
     Image image;
     image.data = bandOf(scaled(dump.header().data, options.scale), options.band);
-    if (image.data.height == 0)
+    if (options.band.count > dump.header().data.height * options.scale)
         throw Error(dump.path(), "expected at least as many rows as bands, found " +
                                      std::to_string(dump.header().data.height * options.scale) +
                                      " rows and " + std::to_string(options.band.count) + " bands");
