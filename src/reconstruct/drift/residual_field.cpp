@@ -14,7 +14,7 @@ namespace {
 constexpr int kLags[] = {1, 2, 3, 4, 6, 8, 12, 16};  // pixels: half a region at most
 constexpr int kClasses = static_cast<int>(std::size(kLags));
 constexpr std::int64_t kFewestData = 100;
-constexpr double kMinExponent = 0.5;
+constexpr double kLeastExponent = 0.5;
 
 /// A mean of products, and the variance of that mean were they independent.
 struct MeanProduct {
@@ -33,6 +33,94 @@ struct MeanProduct {
         return pairs > 0 ? squares / (n * n) : 0;
     }
 };
+
+/// Of one region: means of products at lag 0 and at kLags, and the noise variance of a pixel, summed over R,
+/// G, B.
+struct ResidualProducts {
+    MeanProduct none, lags[kClasses];
+    double noise = 0;
+};
+
+/// gamma(h) in units of a pixel's noise times `unit`, with its null distribution: what all classes share is
+/// C(0).
+EmpiricalVariogram residualVariogram(const ResidualProducts& of, double unit) {
+    EmpiricalVariogram variogram;
+    std::vector<double> errors;
+    for (int k = 0; k < kClasses; ++k) {
+        const MeanProduct& lag = of.lags[k];
+        if (lag.pairs == 0) continue;
+        errors.push_back(unit * std::sqrt(of.none.variance() + lag.variance()));
+        variogram.bins.push_back({.lower = k > 0 ? static_cast<double>(kLags[k - 1]) : 0,
+                                  .upper = static_cast<double>(kLags[k]),
+                                  .pairs = static_cast<double>(lag.pairs),
+                                  .distance = static_cast<double>(kLags[k]),
+                                  .semivariance = unit * (of.none.mean() - lag.mean()),
+                                  .noise = 0,
+                                  .standardError = errors.back()});
+    }
+    const auto classes = static_cast<Eigen::Index>(errors.size());
+    variogram.data = of.none.pairs;
+    variogram.nullError = Eigen::Map<const Eigen::VectorXd>(errors.data(), classes);
+    variogram.nullCorrelation.resize(classes, classes);
+    for (Eigen::Index a = 0; a < classes; ++a)
+        for (Eigen::Index b = 0; b < classes; ++b)
+            variogram.nullCorrelation(a, b) =
+                a == b ? 1
+                       : unit * unit * of.none.variance() / (variogram.nullError[a] * variogram.nullError[b]);
+    return variogram;
+}
+
+/// The stable model. The fit knows no negative nugget: all classes are raised for it, which changes nothing
+/// else.
+VariogramFit fitResidualVariogram(EmpiricalVariogram variogram) {
+    double shift = 0;
+    for (const VariogramBin& bin : variogram.bins) shift = std::max(shift, -2 * bin.semivariance);
+    for (VariogramBin& bin : variogram.bins) bin.semivariance += shift;
+    FitOptions options;
+    options.structures = {{.type = StructureType::Stable,
+                           .maxRange = ResidualField::kSide,
+                           .minShape = kLeastExponent,
+                           .maxShape = 2}};
+    options.search = FitSearch::Fast;
+    VariogramFit fit = fitVariogram(variogram, options);
+    fit.model.nugget -= shift;
+    return fit;
+}
+
+/// What the variogram says, in `region`, and the variogram.
+RegionInspection inspectProducts(const ResidualProducts& of, ResidualRegion& region) {
+    RegionInspection inspection;
+    inspection.neighbourhood = region.pixels;
+    inspection.distance = "pixels";
+    region.data = of.none.pairs;
+    if (region.data < kFewestData) {
+        inspection.fallbacks = {"too few pixels with samples in both halves and noise"};
+        return inspection;
+    }
+    // ResidualProducts are sums over three colours.
+    const EmpiricalVariogram variogram =
+        residualVariogram(of, of.noise / static_cast<double>(region.data) / 3);
+    for (const MeanProduct& lag : of.lags) region.pairs += lag.pairs;
+    inspection.pairs = region.pairs;
+    inspection.classes = variogram.bins;
+    const VariogramFit fit = fitResidualVariogram(variogram);
+    region.statistic = fit.sillTest.statistic;
+    region.pValue = fit.sillTest.pValue;
+    region.structure = fit.sillTest.significant;
+    if (!fit.ok()) {
+        inspection.fallbacks.push_back(fit.message());
+        return inspection;
+    }
+    if (!region.structure)
+        inspection.fallbacks.emplace_back("no structure: the variogram is flat but for noise");
+    inspection.model = fit.model;
+    const VariogramStructure& stable = fit.model.structures.front();
+    region.nugget = fit.model.nugget;
+    region.sill = stable.sill;
+    region.range = stable.range;
+    region.exponent = stable.shape;
+    return inspection;
+}
 
 }  // namespace
 
@@ -78,110 +166,50 @@ void ResidualField::addRow(int y, DriftReport& report) {
 
 void ResidualField::finishRegions(DriftReport& report) {
     const int rows = std::min(kSide, height_ - first_), regions = (width_ + kSide - 1) / kSide;
-    struct Result {
-        ResidualRegion region;
-        RegionInspection inspection;
-    };
-    std::vector<Result> results(static_cast<std::size_t>(regions));
+    std::vector<ResidualRegion> found(static_cast<std::size_t>(regions));
+    std::vector<RegionInspection> inspections(found.size());
     parallelFor(0, regions, [&](std::int64_t number) {
-        auto& [region, inspection] = results[static_cast<std::size_t>(number)];
+        const auto at = static_cast<std::size_t>(number);
         const int left = static_cast<int>(number) * kSide, columns = std::min(kSide, width_ - left);
-        region.pixels = {image_.x + left, image_.y + first_, columns, rows};
-        const auto at = [&](int x, int y) {
+        found[at].pixels = {image_.x + left, image_.y + first_, columns, rows};
+        const auto place = [&](int x, int y) {
             return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
                    static_cast<std::size_t>(left + x);
         };
-        MeanProduct none, lags[kClasses];
-        double noise = 0;
-        const auto product = [&](std::size_t p, std::size_t q) {
-            double sum = 0;
-            for (int c = 0; c < 3; ++c)
-                sum += (static_cast<double>(residuals_[0][c][p]) * static_cast<double>(residuals_[1][c][q]) +
-                        static_cast<double>(residuals_[0][c][q]) * static_cast<double>(residuals_[1][c][p])) /
-                       2;
-            return sum;
-        };
+        ResidualProducts sums;
         for (int y = 0; y < rows; ++y)
             for (int x = 0; x < columns; ++x) {
-                const std::size_t p = at(x, y);
-                const std::int64_t before = none.pairs;
-                none.add(product(p, p));
-                if (none.pairs == before) continue;
-                for (int c = 0; c < 3; ++c) noise += static_cast<double>(noise_[c][p]);
+                const std::size_t p = place(x, y);
+                const double own = product(p, p);
+                if (!std::isfinite(own)) continue;
+                sums.none.add(own);
+                for (int c = 0; c < 3; ++c) sums.noise += static_cast<double>(noise_[c][p]);
                 for (int k = 0; k < kClasses; ++k) {
-                    if (x + kLags[k] < columns) lags[k].add(product(p, at(x + kLags[k], y)));
-                    if (y + kLags[k] < rows) lags[k].add(product(p, at(x, y + kLags[k])));
+                    if (x + kLags[k] < columns) sums.lags[k].add(product(p, place(x + kLags[k], y)));
+                    if (y + kLags[k] < rows) sums.lags[k].add(product(p, place(x, y + kLags[k])));
                 }
             }
-        region.data = none.pairs;
-        inspection.neighbourhood = region.pixels;
-        inspection.distance = "pixels";
-        if (none.pairs < kFewestData) {
-            inspection.fallbacks = {"too few pixels with samples in both halves and noise"};
-            return;
-        }
-        const double unit =
-            noise / static_cast<double>(none.pairs) / 3;  // products are sums over three colours
-        EmpiricalVariogram variogram;
-        std::vector<double> errors;
-        double shift = 0;
-        for (int k = 0; k < kClasses; ++k) {
-            if (lags[k].pairs == 0) continue;
-            const double semivariance = unit * (none.mean() - lags[k].mean());
-            errors.push_back(unit * std::sqrt(none.variance() + lags[k].variance()));
-            variogram.bins.push_back({.lower = k > 0 ? static_cast<double>(kLags[k - 1]) : 0,
-                                      .upper = static_cast<double>(kLags[k]),
-                                      .pairs = static_cast<double>(lags[k].pairs),
-                                      .distance = static_cast<double>(kLags[k]),
-                                      .semivariance = semivariance,
-                                      .noise = 0,
-                                      .standardError = errors.back()});
-            region.pairs += lags[k].pairs;
-            shift = std::max(shift, -2 * semivariance);
-        }
-        inspection.pairs = region.pairs;
-        inspection.classes = variogram.bins;
-        const auto classes = static_cast<Eigen::Index>(errors.size());
-        variogram.data = none.pairs;
-        variogram.nullError = Eigen::Map<const Eigen::VectorXd>(errors.data(), classes);
-        variogram.nullCorrelation.resize(classes, classes);  // by what they share, C(0)
-        for (Eigen::Index a = 0; a < classes; ++a)
-            for (Eigen::Index b = 0; b < classes; ++b)
-                variogram.nullCorrelation(a, b) =
-                    a == b
-                        ? 1
-                        : unit * unit * none.variance() / (variogram.nullError[a] * variogram.nullError[b]);
-        // The fit knows no negative nugget: all classes are raised for it, which changes nothing else.
-        for (VariogramBin& bin : variogram.bins) bin.semivariance += shift;
-        FitOptions options;
-        options.structures = {
-            {.type = StructureType::Stable, .maxRange = kSide, .minShape = kMinExponent, .maxShape = 2}};
-        options.search = FitSearch::Fast;
-        const VariogramFit fit = fitVariogram(variogram, options);
-        region.statistic = fit.sillTest.statistic;
-        region.pValue = fit.sillTest.pValue;
-        region.structure = fit.sillTest.significant;
-        if (!fit.ok()) {
-            inspection.fallbacks.push_back(fit.message());
-            return;
-        }
-        inspection.model = fit.model;
-        inspection.model.nugget -= shift;
-        const VariogramStructure& stable = fit.model.structures.front();
-        region.nugget = inspection.model.nugget;
-        region.sill = stable.sill;
-        region.range = stable.range;
-        region.exponent = stable.shape;
-        if (!region.structure)
-            inspection.fallbacks.push_back("no structure: the variogram is flat but for noise");
+        inspections[at] = inspectProducts(sums, found[at]);
     });
-    for (Result& result : results) {
-        const Window& w = result.region.pixels;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        const Window& w = found[i].pixels;
         if (std::ranges::any_of(inspect_,
                                 [&](const auto& pixel) { return w.contains(pixel.first, pixel.second); }))
-            report.inspections[report.residuals.size()] = std::move(result.inspection);
-        report.residuals.push_back(result.region);
+            report.inspections[report.residuals.size()] = std::move(inspections[i]);
+        report.residuals.push_back(found[i]);
     }
+}
+
+/// Of the halves' residuals in two pixels, both orders, summed over R, G, B.
+double ResidualField::product(std::size_t p, std::size_t q) const {
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) {
+        const std::vector<float>&a = residuals_[0][c], &b = residuals_[1][c];
+        sum += (static_cast<double>(a[p]) * static_cast<double>(b[q]) +
+                static_cast<double>(a[q]) * static_cast<double>(b[p])) /
+               2;
+    }
+    return sum;
 }
 
 }  // namespace vlx

@@ -30,6 +30,7 @@ class ResidualField {
 
   private:
     void finishRegions(DriftReport& report);
+    double product(std::size_t p, std::size_t q) const;
 
     int width_, height_, first_ = 0;  // row of the regions at hand
     Window image_;
