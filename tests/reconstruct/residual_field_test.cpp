@@ -12,30 +12,30 @@
 namespace vlx {
 namespace {
 
-constexpr int kSide = ResidualField::kSide, kAcross = 8, kDown = 8;
-constexpr int kWidth = kAcross * kSide, kHeight = kDown * kSide;
-constexpr float kSamples = 4;  // of a half
+constexpr int kRegion = ResidualField::kSide, kAcross = 8, kDown = 8;
+constexpr int kFieldWidth = kAcross * kRegion, kFieldHeight = kDown * kRegion;
+constexpr float kOfHalf = 4;  // of a half
 
 /// Estimates of 0, of data that are a field (the same in R, G, B, independent in each region) with noise of
 /// variance 1 in each half.
 DriftReport residualsOf(const VariogramModel& field, std::uint64_t seed, double leak = 0) {
     const DataPlanes data{3};
     const CombinedPlanes combined{3};
-    RowRing means(kWidth, data.channels(), kHeight), features(kWidth, 0, kHeight),
-        variances(kWidth, VariancePlanes::kChannels, kHeight),
-        estimates(kWidth, combined.channels(), kHeight);
-    testing::FieldSampler sampler(field, testing::pixelCentres(kSide, kSide), seed);
+    RowRing means(kFieldWidth, data.channels(), kFieldHeight), features(kFieldWidth, 0, kFieldHeight),
+        variances(kFieldWidth, VariancePlanes::kChannels, kFieldHeight),
+        estimates(kFieldWidth, combined.channels(), kFieldHeight);
+    testing::FieldSampler sampler(field, testing::pixelCentres(kRegion, kRegion), seed);
     std::normal_distribution<double> normal;
     for (int row = 0; row < kDown; ++row)
         for (int column = 0; column < kAcross; ++column) {
             const Eigen::VectorXd lacking = sampler.draw();
-            for (int p = 0; p < kSide * kSide; ++p) {
-                const int x = column * kSide + p % kSide, y = row * kSide + p / kSide;
+            for (int p = 0; p < kRegion * kRegion; ++p) {
+                const int x = column * kRegion + p % kRegion, y = row * kRegion + p / kRegion;
                 for (int c = 0; c < 3; ++c) {
-                    variances.row(c, y)[x] = kSamples;
+                    variances.row(c, y)[x] = kOfHalf;
                     const double noise[2] = {normal(sampler.random()), normal(sampler.random())};
                     for (int half = 0; half < 2; ++half) {
-                        means.row(data.halfCount(half), y)[x] = kSamples;
+                        means.row(data.halfCount(half), y)[x] = kOfHalf;
                         means.row(data.mean(half) + c, y)[x] = static_cast<float>(lacking[p] + noise[half]);
                         estimates.row(combined.half(half) + c, y)[x] =
                             static_cast<float>(leak * noise[1 - half]);
@@ -44,9 +44,9 @@ DriftReport residualsOf(const VariogramModel& field, std::uint64_t seed, double 
             }
         }
     DriftReport report;
-    ResidualField residuals(kWidth, kHeight, {0, 0, kWidth, kHeight}, {{5, 40}},
-                            {kWidth, kHeight, means, features, variances, estimates}, estimates, 3);
-    for (int y = 0; y < kHeight; ++y) residuals.addRow(y, report);
+    ResidualField residuals(kFieldWidth, kFieldHeight, {0, 0, kFieldWidth, kFieldHeight}, {{5, 40}},
+                            {kFieldWidth, kFieldHeight, means, features, variances, estimates}, estimates, 3);
+    for (int y = 0; y < kFieldHeight; ++y) residuals.addRow(y, report);
     return report;
 }
 
@@ -59,7 +59,7 @@ TEST(ResidualField, FindsTheSillAndTheRangeInNoiseThatIsLarger) {
     ASSERT_EQ(report.residuals.size(), 64u);
     testing::Sample near, far, found;
     for (const ResidualRegion& r : report.residuals) {
-        EXPECT_EQ(r.data, kSide * kSide);
+        EXPECT_EQ(r.data, kRegion * kRegion);
         found.add(r.structure);
         const auto semivariance = [&](double h) {
             return r.nugget + r.sill * (1 - std::exp(-std::pow(h / r.range, r.exponent)));
