@@ -40,6 +40,31 @@ Between between(double place, int blocks) {
     return {first, std::min(first + 1, blocks - 1), static_cast<float>(from - first)};
 }
 
+/// From the centre of each block to that of the nearest one with samples, in pixels: the chamfer distance of
+/// steps of 1 and sqrt(2) blocks, in two passes (Borgefors 1986); at most 8 % too long.
+std::vector<float> distances(const BlockGrid& grid) {
+    constexpr float kStep = kBlock, kDiagonal = 1.41421356f * kBlock;
+    std::vector<float> result(grid.weights.size());
+    for (std::size_t b = 0; b < result.size(); ++b) result[b] = grid.weights[b] > 0 ? 0 : 1e9f;
+    const auto pass = [&](int col, int row, int side) {  // side -1: from above, 1: from below
+        float& here = result[static_cast<std::size_t>(row * grid.columns + col)];
+        const auto look = [&](int dx, int dy, float step) {
+            const int x = col + dx, y = row + dy;
+            if (x < 0 || x >= grid.columns || y < 0 || y >= grid.rows) return;
+            here = std::min(here, result[static_cast<std::size_t>(y * grid.columns + x)] + step);
+        };
+        look(side, 0, kStep);
+        look(0, side, kStep);
+        look(side, side, kDiagonal);
+        look(-side, side, kDiagonal);
+    };
+    for (int row = 0; row < grid.rows; ++row)
+        for (int col = 0; col < grid.columns; ++col) pass(col, row, -1);
+    for (int row = grid.rows; row-- > 0;)
+        for (int col = grid.columns; col-- > 0;) pass(col, row, 1);
+    return result;
+}
+
 }  // namespace
 
 GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const GatheredPlanes& planes)
@@ -65,8 +90,8 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
             for (int f = 0; f < layout.features; ++f) sums[layout.radiance + f] += of(planes.feature() + f);
         }
     }
-    // Pull: a block of the next scale is the mean of its four, each counting no more than a full one. What
-    // was fetched from 8 x 8 pixels away has lain 4 pixels away on average, and so on.
+    const std::vector<float> far = distances(grids[0]);
+    // Pull: a block of the next scale is the mean of its four, each counting no more than a full one.
     while (true) {
         BlockGrid& fine = grids.back();
         for (std::size_t b = 0; b < fine.weights.size(); ++b) {
@@ -74,7 +99,6 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
             if (fine.weights[b] == 0) continue;
             for (int k = 0; k < distance; ++k) sums[k] /= fine.weights[b];
             fine.weights[b] = std::min(1.f, fine.weights[b]);
-            sums[distance] = static_cast<float>(kBlock << (grids.size() - 1)) / 2;
         }
         if (fine.columns == 1 && fine.rows == 1) break;
         BlockGrid coarse = makeGrid((fine.columns + 1) / 2, (fine.rows + 1) / 2, values_);
@@ -109,6 +133,8 @@ GapField::GapField(const SampleSource& dump, const SampleLayout& layout, const G
     columns_ = grids[0].columns;
     rows_ = grids[0].rows;
     blocks_ = std::move(grids[0].sums);
+    for (std::size_t b = 0; b < far.size(); ++b)
+        blocks_[b * static_cast<std::size_t>(values_) + static_cast<std::size_t>(distance)] = far[b];
 }
 
 double GapField::at(double x, double y, std::vector<float>& values) const {
@@ -125,7 +151,7 @@ double GapField::at(double x, double y, std::vector<float>& values) const {
     }
     const double distance = static_cast<double>(values.back());
     values.pop_back();
-    return distance;
+    return std::max(0.0, distance - kBlock / 2.0);  // samples reach to their blocks' borders
 }
 
 std::uint64_t GapField::bytes(const SampleSource& dump, const SampleLayout& layout) {
