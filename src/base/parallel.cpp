@@ -11,13 +11,6 @@
 #include <mutex>
 #include <thread>
 #include <vector>
-#elif defined(VARIOLUX_SANITIZED)
-#include <chrono>
-#include <filesystem>
-#include <iterator>
-#include <system_error>
-#include <thread>
-#include <utility>
 #endif
 
 namespace vlx {
@@ -61,21 +54,6 @@ void parallelFor(std::int64_t begin, std::int64_t end, const std::function<void(
 void endThreads() {
     tbb::task_scheduler_handle threads{tbb::attach{}};
     static_cast<void>(tbb::finalize(threads, std::nothrow));  // others may still use them
-#ifdef VARIOLUX_SANITIZED
-    // LeakSanitizer crashes on a thread that it meets half gone: until their number stays the same for 50 ms.
-    const auto count = [] {
-        std::error_code none;
-        const std::filesystem::directory_iterator tasks("/proc/self/task", none);
-        return std::distance(begin(tasks), end(tasks));
-    };
-    using namespace std::chrono_literals;
-    for (auto [last, calm] = std::pair{count(), 0}; last > 1 && calm < 5;) {
-        std::this_thread::sleep_for(10ms);
-        const auto now = count();
-        calm = now == last ? calm + 1 : 0;
-        last = now;
-    }
-#endif
 }
 
 #endif
