@@ -20,10 +20,11 @@ struct LightReach {
 /// Fireflies that were limited, and error variances that go with brightness, make the estimate darker than
 /// the samples are on average: by little in each pixel, by much in all. With rho = z - y, what the samples'
 /// mean z has more than the estimate y, sums over a window under weights g, of R, G, B each,
-///     T = sum g rho,    Q = sum over colours of sum g^2 rho^2,    A = sum g a,    a = y^1.5 / (1 + y / (20
-///     s)):
-/// a, what a pixel is given a share of, s the standard deviation that is predicted for it. The power is a
-/// convention between y, the share that all have had, and y^2, the least relative change; what is known to
+///     T = sum g rho,    Q = sum over colours of sum g^2 rho^2,    A = sum g a,
+///     a = y^1.5 / (1 + y / (20 s)):
+/// a, what a pixel is given a share of, s the standard deviation that is predicted for it. The power lies
+/// between y, the share that all have had, and y^2, the least relative change (chosen by looking: METHOD.md
+/// 7.7); what is known to
 /// within 5 % or better has less. A pixel moves by l a, l = T / A as far as it is no accident, as the rho
 /// themselves tell (James and Stein, colours together; self-normalised: one outlier has T^2 = Q, and is
 /// nothing):
