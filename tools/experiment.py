@@ -1,6 +1,7 @@
 """Runs programs, `vlx-compare sweep` above all, for the project's experiments: the sweep's records are the only ones, and
 charts are drawn by chart.py. Python 3 and its standard library only."""
 
+import datetime
 import json
 import os
 import shlex
@@ -55,3 +56,10 @@ def link(target, name):
     if os.path.lexists(name):
         os.remove(name)
     os.symlink(os.path.relpath(target, os.path.dirname(name)), name)
+
+
+def stamp(options):
+    """Date, commit of the code (options.commit, if given), machine."""
+    commit = options.commit or run("git", "-C", ROOT, "log", "-1", "--format=%h", "--", "include", "src", "tools/*.cpp", ":!*.md").strip()
+    cpu = next(line.split(":")[1].strip() for line in run("lscpu").splitlines() if line.startswith("Model name"))
+    return f"{datetime.date.today()}, commit {commit}, {cpu}, {os.cpu_count()} cores"

@@ -1,6 +1,7 @@
 #include "krige_options.h"
 
 #include <cstdio>
+#include <map>
 
 #include "finished.h"
 #include "tool_main.h"
@@ -12,7 +13,7 @@ namespace {
 const std::vector<OptionUse>& usesByMethod() {
     static const std::vector<OptionUse> uses = {
         {{"--quality", "--fireflies", "--strength", "--feature", "--radiance", "--scale", "--filter",
-          "--band", "--no-features", "--max-memory"},
+          "--band", "--no-features", "--without", "--max-memory"},
          {"--method krige"}},
         {{"--clamp"}, {"--fireflies clamp"}},
         {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
@@ -33,6 +34,28 @@ const std::vector<OptionUse>& usesByInput() {
         {{"--map"}, {"a flat image", "--template"}},
         {{"--layers-are-samples", "--positions"}, {"a dump"}}};
     return uses;
+}
+
+/// Steps that can be left out.
+void addSteps(CLI::App& app, DriftSteps& steps) {
+    static const std::map<std::string, bool DriftSteps::*> names = {
+        {"prefilter", &DriftSteps::prefilter}, {"unseen", &DriftSteps::unseen},
+        {"stacking", &DriftSteps::stacking},   {"half-resolution", &DriftSteps::halfResolution},
+        {"outliers", &DriftSteps::outliers},   {"light", &DriftSteps::light}};
+    app.add_option_function<std::vector<std::string>>(
+           "--without",
+           [&steps](const std::vector<std::string>& left) {
+               for (const std::string& name : left) steps.*names.at(name) = false;
+           },
+           "krige: leave out a step, to show what it does (METHOD.md, 7): prefilter of noisy features, "
+           "unseen (what no "
+           "sample met, in error variances), stacking of models, half-resolution, outliers, light (given "
+           "back); "
+           "repeatable")
+        ->option_text("STEP")
+        ->check(CLI::IsMember(names))
+        ->take_all()
+        ->expected(1);
 }
 
 }  // namespace
@@ -117,6 +140,7 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
                    "sampling.density, for vlx-trace --append --sample-map (not with --method gaussian)")
         ->option_text("IMAGE");
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
+    addSteps(app, o.krige.steps);
     app.add_option("--sigma", o.gaussian.sigma, "gaussian: standard deviation in pixels")
         ->check(finitePositive())
         ->capture_default_str();

@@ -77,7 +77,7 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
         ->type_name("MAP");
     app.add_option("--replicates", o.render.replicates,
                    "Divide the samples of each pixel into this many independent randomisations\n"
-                   "(written as sample.replicate)")
+                   "(written as sample.replicate). 1: two, samples of even and of odd number")
         ->check(CLI::Range(1, 1 << 24))
         ->excludes(hierarchical)
         ->capture_default_str();

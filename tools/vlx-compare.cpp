@@ -115,6 +115,8 @@ void bind(CLI::App& app, Options& options) {
   ssim            structural similarity of t(x) and t(r) (Wang et al. 2004:
                   Gaussian window 11 x 11, sigma 1.5), mean over R, G, B
   bias            (mean x - mean r) / mean |r|; limits judge its magnitude
+  gross           share of pixels wrong by a factor of two: by the mean of
+                  R, G, B, x < r / 2 where r > 0.03, or x > 2 r + 0.03
   nonfinite       pixels of x with a NaN or infinite channel
   negative        pixels of x with a channel below zero
 

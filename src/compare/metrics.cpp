@@ -24,6 +24,16 @@ bool isFinite(const float* pixel) {
     return std::isfinite(pixel[0]) && std::isfinite(pixel[1]) && std::isfinite(pixel[2]);
 }
 
+/// Wrong by a factor of two: Metric::Gross.
+bool isGross(const float* image, const float* reference) {
+    constexpr double kDark = 0.03;
+    const auto mean = [](const float* pixel) {
+        return (static_cast<double>(pixel[0]) + pixel[1] + pixel[2]) / 3;
+    };
+    const double x = mean(image), r = mean(reference);
+    return (x < r / 2 && r > kDark) || x > 2 * r + kDark;
+}
+
 bool isNegative(const float* pixel) { return pixel[0] < 0 || pixel[1] < 0 || pixel[2] < 0; }
 
 /// Sums over a row of pixels; rows are added up in order, so threads cannot change a result.
@@ -36,6 +46,7 @@ struct Sums {
     double reference = 0;
     double referenceMagnitude = 0;
     std::int64_t used = 0;
+    std::int64_t gross = 0;
     std::int64_t nonFinite = 0;
     std::int64_t negative = 0;
     std::int64_t referenceNonFinite = 0;
@@ -50,6 +61,7 @@ struct Sums {
         reference += other.reference;
         referenceMagnitude += other.referenceMagnitude;
         used += other.used;
+        gross += other.gross;
         nonFinite += other.nonFinite;
         negative += other.negative;
         referenceNonFinite += other.referenceNonFinite;
@@ -91,6 +103,7 @@ const std::array<MetricInfo, kMetricCount>& metricInfos() {
         {Metric::Psnr, "psnr", "PSNR dB", true},
         {Metric::Ssim, "ssim", "SSIM", true},
         {Metric::Bias, "bias", "bias", false},
+        {Metric::Gross, "gross", "gross", false},
         {Metric::NonFinite, "nonfinite", "non-finite", false},
         {Metric::Negative, "negative", "negative", false},
     }};
@@ -171,6 +184,7 @@ Comparison compareColour(const Image& reference, const Image& image, const std::
                 sums.referenceMagnitude += std::abs(truth);
             }
             sums.relative += relative;
+            sums.gross += isGross(x, r);
             errors.push_back(relative / 3);
             ++sums.used;
         }
@@ -198,6 +212,7 @@ Comparison compareColour(const Image& reference, const Image& image, const std::
 
     const double count = 3.0 * static_cast<double>(sums.used);
     const double toneMappedRmse = std::sqrt(sums.toneMapped / count);
+    set(Metric::Gross, static_cast<double>(sums.gross) / static_cast<double>(sums.used));
     set(Metric::Mse, sums.squared / count);
     set(Metric::Rmse, std::sqrt(sums.squared / count));
     set(Metric::RelMse, sums.relative / count);

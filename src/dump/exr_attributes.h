@@ -18,6 +18,7 @@ inline constexpr char kPixelFilter[] = "variolux:pixelFilter";
 inline constexpr char kEffects[] = "variolux:effects";
 inline constexpr char kSplatReplicates[] = "variolux:splatReplicates";
 inline constexpr char kReplicatesShare[] = "variolux:replicatesShare";
+inline constexpr char kIndependentHalves[] = "variolux:independentHalves";
 inline constexpr char kRenderSeconds[] = "variolux:renderSeconds";
 inline constexpr char kMaxSamples[] = "maxSamplesPerPixel";
 inline constexpr char kWorldToCamera[] = "worldToCamera";

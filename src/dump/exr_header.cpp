@@ -154,6 +154,7 @@ DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
         if (status == std::errc() && end == text->data() + text->size()) dump.seed = seed;
     }
     dump.replicatesShare = value<int>(header, kReplicatesShare).value_or(0) != 0;
+    dump.independentHalves = value<int>(header, kIndependentHalves).value_or(0) != 0;
     dump.samples = number(header, kSamples);
     dump.renderSeconds = number(header, kRenderSeconds);
     if (dump.renderSeconds && !(*dump.renderSeconds > 0)) dump.renderSeconds.reset();  // 0: not recorded

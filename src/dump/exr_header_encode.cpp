@@ -152,6 +152,7 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
         text(kPixelFilter, dump.pixelFilter);
         text(kEffects, listed(dump.effects, ","));
         if (dump.replicatesShare) samples.insert(kReplicatesShare, Imf::IntAttribute(1));
+        if (dump.independentHalves) samples.insert(kIndependentHalves, Imf::IntAttribute(1));
         if (dump.seed) text(kSeed, std::to_string(*dump.seed));
         if (dump.samples) samples.insert(kSamples, Imf::DoubleAttribute(*dump.samples));
         samples.insert(kRenderSeconds, Imf::DoubleAttribute(dump.renderSeconds.value_or(0)));

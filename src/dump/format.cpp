@@ -50,9 +50,9 @@ std::vector<MissingPart> missingChannels(const DumpHeader& header) {
     if (!has({"Z"})) lacks("distance (Z)", "borders between near and far do not guide the reconstruction");
     if (!has({"A"}))
         lacks("hit flag (A)", "pixels that see past the scene are not told apart, the image has no alpha");
-    if (!has({"sample.replicate"}))
+    if (!has({"sample.replicate"}) && !header.independentHalves)
         lacks("replicates (sample.replicate)",
-              "samples count as independent: for low-discrepancy samples the error is overstated");
+              "samples count as independent: of low-discrepancy samples the error map tells less");
     if (header.pixelFilter.empty())
         lacks("pixel filter (variolux:pixelFilter)", "a box filter of one pixel is assumed");
     return missing;

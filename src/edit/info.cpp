@@ -147,6 +147,8 @@ std::string toText(const DumpInfo& info) {
     if (header.splatReplicates > 0)
         line("splats", "of " + std::to_string(header.splatReplicates) +
                            " replicates; reading adds them to the samples of their replicate");
+    if (header.independentHalves)
+        line("halves", "samples of even and odd number are independent randomisations");
     if (info.missing.empty()) line("missing", "nothing");
     for (const auto& part : info.missing) line("missing", part.what + ": " + part.cost);
     return text;
@@ -171,7 +173,8 @@ std::string toJson(const DumpInfo& info) {
                    {"max", info.maxSamples},
                    {"emptyPixels", info.emptyPixels},
                    {"nonFinite", info.nonFiniteSamples},
-                   {"replicates", info.replicates}}},
+                   {"replicates", info.replicates},
+                   {"independentHalves", header.independentHalves}}},
                  {"layers", info.layers},
                  {"fileBytes", info.fileBytes},
                  {"rawBytes", info.rawBytes},

@@ -64,6 +64,7 @@ void checkSamePicture(const DumpReader& first, const DumpReader& part) {
     check("seed", a.seed, b.seed);
     check("samples", a.samples, b.samples);
     check("replicates with splats", a.splatReplicates, b.splatReplicates);
+    check("independent halves", a.independentHalves, b.independentHalves);
     check("pixel filter", a.pixelFilter, b.pixelFilter);
     check("effects", a.effects, b.effects);
     check("worldToCamera", a.worldToCamera, b.worldToCamera);

@@ -66,11 +66,11 @@ std::optional<ReplicateChoice> chooseReplicates(const DumpReader& reader, const 
     return choice;
 }
 
-/// The samples of one pixel to keep, in increasing order.
+/// The samples of one pixel to keep, in increasing order; where halves are independent, of either by turns.
 class PixelChoice {
   public:
     PixelChoice(const DumpReader& reader, const SubsetOptions& options)
-        : path_(reader.path()), options_(options) {}
+        : path_(reader.path()), options_(options), halves_(reader.header().independentHalves) {}
 
     const std::vector<std::uint64_t>& operator()(int x, int y, std::uint64_t count) {
         const std::uint64_t first = std::uint64_t{options_.part} * options_.samples;
@@ -82,15 +82,25 @@ class PixelChoice {
         order_.clear();
         for (std::uint64_t i = 0; i < count; ++i) order_.emplace_back(hashOf(options_.seed, x, y, i), i);
         std::sort(order_.begin(), order_.end());
+        if (halves_) takeTurns();
         kept_.clear();
         for (std::uint64_t i = first; i < first + options_.samples; ++i) kept_.push_back(order_[i].second);
-        std::sort(kept_.begin(), kept_.end());
+        if (!halves_) std::sort(kept_.begin(), kept_.end());
         return kept_;
     }
 
   private:
+    /// Samples of even and of odd number by turns, those of each in the order in which they are.
+    void takeTurns() {
+        std::ranges::stable_partition(order_, [](const auto& sample) { return sample.second % 2 == 0; });
+        const std::vector<std::pair<std::uint64_t, std::uint64_t>> apart = order_;
+        const std::size_t even = (apart.size() + 1) / 2;
+        for (std::size_t i = 0; i < apart.size(); ++i) order_[i] = apart[i % 2 == 0 ? i / 2 : even + i / 2];
+    }
+
     std::string path_;
     SubsetOptions options_;
+    bool halves_;
     std::vector<std::pair<std::uint64_t, std::uint64_t>> order_;
     std::vector<std::uint64_t> kept_;
 };

@@ -43,9 +43,23 @@ TEST(Metrics, ConstantImagesHaveTheAnalyticValues) {
     // Without structure, SSIM is its luminance term.
     const double x = toneMapped(0.75), r = toneMapped(0.5);
     EXPECT_NEAR(result[Metric::Ssim], (2 * x * r + 1e-4) / (x * x + r * r + 1e-4), 1e-12);
+    EXPECT_EQ(result[Metric::Gross], 0);
     EXPECT_EQ(result.ssimWindows, 10 * 20);
     EXPECT_EQ(result.pixels, 600);
     EXPECT_EQ(result.excluded, 0);
+}
+
+TEST(Metrics, GrossPixelsAreWrongByAFactorOfTwo) {
+    Image reference = constant(4, 1, 0.1f), image = constant(4, 1, 0.1f);
+    const float values[4][2] = {{0.1f, 0.049f}, {0.1f, 0.051f}, {0.1f, 0.231f}, {0.029f, 0}};
+    for (int x = 0; x < 4; ++x)
+        for (int c = 0; c < 3; ++c) {
+            reference.at(x, 0)[c] = values[x][0];
+            image.at(x, 0)[c] = values[x][1];
+        }
+    EXPECT_DOUBLE_EQ(compareColour(reference, image)[Metric::Gross], 0.5);
+    image.at(2, 0)[0] = -0.1f;  // by the mean of the channels
+    EXPECT_DOUBLE_EQ(compareColour(reference, image)[Metric::Gross], 0.25);
 }
 
 TEST(Metrics, EqualImagesArePerfect) {

@@ -132,7 +132,8 @@ class FinishingTest : public testing::Test {
     FinishingTest()
         : level_(kSide, 4),
           clean_(kSide, CleanPlanes{4}.channels(), kSide),
-          light_(kSide, LightPlanes::kChannels, kSide) {
+          light_(kSide, LightPlanes::kChannels, kSide),
+          common_(kSide, CommonErrorPlanes::kChannels, kSide) {
         layout_.names = {"R", "G", "B", "key.R"};
         layout_.radiance = 4;
         for (int c = 0; c < 4; ++c) {
@@ -144,7 +145,8 @@ class FinishingTest : public testing::Test {
         level_.set(level_.data, data_.count(), 8);
     }
     void finish() {
-        Finishing finishing(layout_, 1, 1, picture_, level_.rows(), level_.combined, clean_, light_);
+        Finishing finishing(layout_, options_, picture_, level_.rows(), level_.combined, clean_, light_,
+                            common_);
         for (int y = 0; y < kSide; ++y) finishing.cleanRow(y);
         for (int y = 0; y < kSide; ++y) finishing.errorRow(y);
         image_.resize(static_cast<std::size_t>(kSide) * kSide * 7);
@@ -167,10 +169,11 @@ class FinishingTest : public testing::Test {
 
     DataPlanes data_{4};
     CombinedPlanes planes_{4};
+    Drift options_;
     SampleLayout layout_;
     PictureScale picture_;
     MadeUpLevel level_;
-    RowRing clean_, light_;
+    RowRing clean_, light_, common_;
     std::vector<float> image_;
     Finishing::Counts counts_;
 };

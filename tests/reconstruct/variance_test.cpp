@@ -32,7 +32,7 @@ struct VarianceTest : testing::Test {
     }
     double variance(const RowRing* of, int plane = 0) {
         RowRing out(kSide, VariancePlanes::kChannels, kSide), features(kSide, 0, kSide);
-        smoothVariances(squares, data, kData, features, 0, picture, of, kHere, kSide, kSide, out);
+        smoothVariances(squares, data, kData, features, 0, picture, true, of, kHere, kSide, kSide, out);
         return static_cast<double>(out.row(plane, kHere)[kHere]);
     }
     double unseen(double level) const { return unseenVariance(kWindow * kSamples, level); }

@@ -158,14 +158,15 @@ TEST(Hierarchical, PartlyOutsideStillStops) {
 }
 
 TEST(Uniform, EachPixelIsStratified) {
+    // Each half, of samples of even or of odd number.
     const Window window{100, 200, 3, 2};
-    std::map<std::pair<int, int>, std::vector<CameraSample>> pixels;
-    sampleUniformly(window, 16, 1, 9, [&](const CameraSample& s) {
-        pixels[{s.column, s.row}].push_back(s);
+    std::map<std::tuple<int, int, std::uint64_t>, std::vector<CameraSample>> halves;
+    sampleUniformly(window, 32, 1, 9, [&](const CameraSample& s) {
+        halves[{s.column, s.row, s.seed}].push_back(s);
         return Rgb();
     });
-    EXPECT_EQ(pixels.size(), 6u);
-    for (const auto& [pixel, samples] : pixels) {
+    EXPECT_EQ(halves.size(), 12u);
+    for (const auto& [half, samples] : halves) {
         ASSERT_EQ(samples.size(), 16u);
         std::set<std::pair<int, int>> strata;
         for (const CameraSample& s : samples) {
@@ -202,6 +203,42 @@ TEST(Uniform, MoreSamplesBeginWithTheFewer) {
     };
     const auto few = collect(5), many = collect(50);
     EXPECT_TRUE(std::equal(few.begin(), few.end(), many.begin()));
+}
+
+TEST(Uniform, SamplesOfEvenAndOddNumberAreSeparateRandomisations) {
+    std::vector<CameraSample> samples;
+    sampleUniformly({0, 0, 1, 1}, 9, 1, 1, [&](const CameraSample& s) {
+        samples.push_back(s);
+        return Rgb();
+    });
+    ASSERT_EQ(samples.size(), 9u);
+    EXPECT_NE(samples[0].seed, samples[1].seed);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        EXPECT_EQ(samples[i].seed, samples[i % 2].seed);
+        EXPECT_EQ(samples[i].index, i / 2);
+        EXPECT_EQ(samples[i].replicate, 0u);
+        const CameraSample alone = sampleInPixel(0, 0, samples[i].seed, samples[i].index);
+        EXPECT_EQ(samples[i].x, alone.x);
+        EXPECT_EQ(samples[i].y, alone.y);
+    }
+}
+
+TEST(Uniform, HalvesOfThePixelAreNotCorrelated) {
+    // The mean position of each half of 4 samples: within a half spread evenly, between them by chance. One
+    // randomisation of all 4 would have a correlation near -1.
+    double products = 0, squares = 0, n = 0;
+    sampleUniformly({0, 0, 64, 64}, 4, 1, 3,
+                    [&, i = 0, sum = std::array<double, 2>{}](const CameraSample& s) mutable {
+                        sum[static_cast<std::size_t>(i % 2)] += static_cast<double>(s.x) - s.column - 0.5;
+                        if (++i % 4 == 0) {
+                            products += sum[0] * sum[1];
+                            squares += (sum[0] * sum[0] + sum[1] * sum[1]) / 2;
+                            ++n;
+                            sum = {};
+                        }
+                        return Rgb();
+                    });
+    EXPECT_LT(std::abs(products / squares), 4 / std::sqrt(n));  // four standard errors
 }
 
 TEST(Uniform, ReplicatesAreSeparateRandomisations) {

@@ -23,10 +23,12 @@ enum class Metric {
     Psnr,            ///< -20 log10(RmseToneMapped), decibels; infinite for equal images. Higher is better
     Ssim,            ///< structural similarity of t(x) and t(r): see compareColour. Higher is better
     Bias,            ///< (mean x - mean r) / mean |r|: energy gained or lost; its magnitude counts
+    Gross,           ///< fraction of pixels wrong by a factor of two: with x and r means over the channels,
+                     ///< x < r / 2 where r > 0.03, or x > 2 r + 0.03. Black dots, fireflies
     NonFinite,       ///< pixels of x with a NaN or infinite channel
     Negative,        ///< finite pixels of x with a channel below zero
 };
-inline constexpr std::size_t kMetricCount = 11;
+inline constexpr std::size_t kMetricCount = 12;
 
 /// How a metric is named and read.
 struct MetricInfo {

@@ -39,8 +39,9 @@ struct DumpHeader {
     std::optional<double> renderSeconds;              ///< wall time of tracing
     std::optional<std::vector<float>> worldToCamera;  ///< 16 values, row vectors (OpenEXR convention)
     std::optional<std::vector<float>> worldToNDC;     ///< likewise
-    int splatReplicates = 0;       ///< replicates of the part `splats` (splats.h); 0: there is no such part
-    bool replicatesShare = false;  ///< samples of a replicate in a pixel have some light in common: splats
+    int splatReplicates = 0;         ///< replicates of the part `splats` (splats.h); 0: there is no such part
+    bool replicatesShare = false;    ///< samples of a replicate in a pixel have some light in common: splats
+    bool independentHalves = false;  ///< a pixel's samples of even and of odd number are independent
     std::map<std::string, std::string> extra;  ///< other text attributes, kept from and to the file
 };
 

@@ -29,14 +29,10 @@
 ///    variances and 1 their scale: noise hides edges from the colours that features show.
 /// 4. *No seams*: a neighbourhood predicts all its pixels; a pixel averages the predictions of all
 ///    neighbourhoods that hold it, weighted by w over their noise.
-/// 5. *Models*: medium and strict, large and tolerant, small. Where few data are like the centre the medium
-///    model keeps their noise: it is shrunk towards the small one by positive-part James-Stein, by how much
-///    of their difference noise explains: half of what its own halves differ in, (A - B)^2 / 4, and half of
-///    (h1 - h3)+^2 sum over colours of v / n; h is what the pixel's datum weighs in its estimate (the
-///    diagonal of the hat matrix), averaged over neighbourhoods. Models and the pixel's plain mean are
-///    combined per pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the
-///    reverse, fitted over about 20 x 20 pixels; the plain mean enters only where it improves by one standard
-///    error.
+/// 5. *Models*: medium and strict, large and tolerant, small; they and the pixel's plain mean are combined
+/// per
+///    pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse,
+///    fitted over about 20 x 20 pixels; the plain mean enters only where it improves by one standard error.
 /// 6. *Half the resolution*: the same data, 2 x 2 pixels as one, are kriged by the same models, C. The
 ///    estimate K becomes K + w (L - K), L = K + up(C - down(K)), with the w in 0 to 1 by which each half's
 ///    correction predicts the other half's data best in 7 x 7 pixels (half_resolution.h). Noise of low
@@ -53,8 +49,11 @@
 ///    functions), less what they spread about their mean, which averaging takes off. That spread is added, as
 ///    what the drift does not say, and so is what a model differs from the combination by beyond its own
 ///    variance; half the resolution mixes its own in by w, where that is less, and adds w (1 - w) (L - K)^2.
-///    Lost light is known to as many samples as lost it: y^2 times sum r^2 / (sum y)^2. A pixel's own
-///    scatter beyond two standard deviations of its mean counts by h^2.
+///    Errors u of the features make 2 sum b^2 u of it. What the halves have wrong alike their difference does
+///    not show: the product of their residuals does, (z_A - A)(z_B - B), in which noise cancels; what it has
+///    more than all this, pooled over 33 rows by 33 and 513 columns, is added (drift/common_error.h). Lost
+///    light is known to as many samples as lost it: y^2 times sum r^2 / (sum y)^2. A pixel's own scatter
+///    beyond two standard deviations of its mean counts by h^2.
 /// 9. *What samples do not say*: no pixel is exact but where the dump states an error variance of 0, there
 ///    and at all pixels that it was pooled over. What the n samples around a pixel did not see has a
 ///    probability of up to 3 / n (95 % confidence): the variance of a sample is larger by 3 / n times the
@@ -89,6 +88,17 @@ enum class Fireflies {
     Clamp,   ///< samples above a given luminance are scaled down to it: a bias that stays
 };
 
+/// Steps of the method, all of them taken. Leaving one out shows what it does (METHOD.md 7, and
+/// testdata/results/ablation.md).
+struct DriftSteps {
+    bool prefilter = true;       ///< 2: noisy features are prefiltered; else their pixels' own means
+    bool unseen = true;          ///< 9: error variances count what no sample met; else only what samples show
+    bool stacking = true;        ///< 5: models are combined; else the medium one alone
+    bool halfResolution = true;  ///< 6
+    bool outliers = true;        ///< 7: pixels beyond the range of their neighbours
+    bool light = true;           ///< 7: light given back
+};
+
 /// The method's options. With a scale above 1 the samples are sorted into parts of their pixels by their
 /// positions, and parts without samples are predicted; the windows grow by the scale. Memory depends on the
 /// picture's width, not its height. Every channel gets the same weights: parts that add up to R, G, B still
@@ -112,7 +122,8 @@ struct Drift {
     /// (DriftReport::inspections), with `diagnostics`.
     std::vector<std::pair<int, int>> inspect = {};
 
-    int scale = 1;   ///< 1 to 4: pixels of the image along each axis for one of the dump
+    int scale = 1;  ///< 1 to 4: pixels of the image along each axis for one of the dump
+    DriftSteps steps = {};
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
 
     /// Bytes that the process may take, at most (resident memory, as the kernel counts it); 0: any number.

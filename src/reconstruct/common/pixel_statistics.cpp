@@ -153,6 +153,8 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const Drift& options) 
         layout.replicate = static_cast<int>(layout.names.size());
         layout.names.emplace_back("sample.replicate");
     }
+    // Parts of pixels do not keep the order.
+    layout.independentHalves = header.independentHalves && options.scale == 1;
     if (options.scale > 1) {
         for (const char* channel : {"sample.x", "sample.y"})
             requireChannel(dump, layout, channel, "--scale, which needs positions");
@@ -201,6 +203,8 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
                 halves[replicateNumber(band.values[static_cast<std::size_t>(layout.replicate)][s]).value() %
                        2]
                     .push_back(s);
+        else if (layout.independentHalves && taken.size() > 1)
+            for (const std::size_t s : taken) halves[(s - band.offsets[pixel]) % 2].push_back(s);
         if (halves[0].empty() || halves[1].empty()) {  // no replicates, or only one
             order.clear();
             for (std::size_t i = 0; i < taken.size(); ++i)

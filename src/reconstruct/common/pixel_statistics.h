@@ -23,9 +23,10 @@ struct SampleLayout {
     std::vector<int> group;          ///< of each feature; components of one vector share a group
     std::vector<float> scale;        ///< of each feature: what is stored is feature / scale
     int groups = 0;
-    int replicate = -1;  ///< index in `names`
-    int position = -1;   ///< index in `names` of sample.x, sample.y after it; where they are needed
-    int variance = -1;   ///< index in `names` of the first of kVarianceChannels, all three of which are there
+    bool independentHalves = false;  ///< DumpHeader's, of the samples as they are gathered
+    int replicate = -1;              ///< index in `names`
+    int position = -1;  ///< index in `names` of sample.x, sample.y after it; where they are needed
+    int variance = -1;  ///< index in `names` of the first of kVarianceChannels, all three of which are there
 };
 
 /// Of linear R, G, B with the primaries of Rec. 709; not negative.
@@ -58,11 +59,12 @@ struct GatherCounts {
 
 /// Gathers one row (counted from the band's top) into planes of row y.
 ///
-/// Halves A and B are the replicates of even and odd number where the dump has replicates, else a random half
-/// of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are not
-/// alike, and may lie on different sides of the pixel. Single samples belong to A and B by turns along a row,
-/// starting with A or B by turns from row to row: a chessboard where every pixel has one. Samples with known
-/// error variances (kVarianceChannels) stand for their own scatter. A sample with radiance that is not
+/// Halves A and B are the replicates of even and odd number where the dump has replicates, samples of even
+/// and odd number where it says that these are independent (DumpHeader::independentHalves), else a random
+/// half of each pixel's samples (seeded by its place): consecutive samples of a low-discrepancy sampler are
+/// not alike, and may lie on different sides of the pixel. Single samples belong to A and B by turns along a
+/// row, starting with A or B by turns from row to row: a chessboard where every pixel has one. Samples with
+/// known error variances (kVarianceChannels) stand for their own scatter. A sample with radiance that is not
 /// finite, or beyond 2^50, whose squares floats do not hold, is dropped; other values that are not finite
 /// count as 0. Features are saturated(feature / scale), sample by sample. Sums run in double precision about
 /// the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.

@@ -148,6 +148,15 @@ struct LightPlanes {
     }
 };
 
+/// Sums along a row of what the halves have wrong alike, of the near window, 0, and of the wide one, 1
+/// (common_error.h).
+struct CommonErrorPlanes {
+    static constexpr int products(int window) { return 3 * window; }
+    static constexpr int squares(int window) { return 3 * window + 1; }  ///< of products
+    static constexpr int pixels(int window) { return 3 * window + 2; }
+    static constexpr int kChannels = 6;
+};
+
 /// Mean of all samples of a pixel; 0 where it has none.
 inline double plainMean(const RowRing& data, const DataPlanes& planes, int channel, int x, int y) {
     const double nA = data.row(planes.halfCount(0), y)[x], nB = data.row(planes.halfCount(1), y)[x];

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "reconstruct/drift/gram.h"
-#include "reconstruct/drift/wild_values.h"
 
 namespace vlx {
 
@@ -18,9 +17,60 @@ constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this man
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
 // than their prefilter says. Twice the standard deviation.
 constexpr double kFeatureErrorFactor = 4;
+// Of a prediction: between the prefilter's own error variance and the four times that D allows for.
+constexpr float kPredictedFeatureError = 2;
 constexpr int kPriorIterations = 4;
 
+constexpr double kWildVariances = 9;  // beyond three standard deviations a value may be wild
+constexpr double kFew = 0.02;         // of the values: as many may be
+
 int lanesUp(int n) { return (n + 7) & ~7; }
+
+/// A feature's values in a neighbourhood.
+struct WeightedValues {
+    float* values;
+    const float* weights;
+    int count, padded;  ///< whole vectors: beyond `count` both are 0
+    double total;       ///< of the weights
+};
+
+/// Weighted variance of the values, once wild ones are forgotten: a few (2 %) that lie farther from the range
+/// of all others than it is wide, and than `square` allows features to differ at all, would fix a coefficient
+/// by themselves. They count as not known: as the mean of the others. `sorted`: scratch.
+double forgetWild(const WeightedValues& of, float square, std::vector<float>& sorted) {
+    float* const x = of.values;
+    const int n = of.count;
+    double sums[2];
+    weightedSums(x, of.weights, of.padded, sums);
+    double mean = sums[0] / of.total;
+    const double variance = (sums[1] - sums[0] * mean) / of.total;
+    const float far = farthest(x, of.weights, of.padded, static_cast<float>(mean));
+    if (far <= square || static_cast<double>(far) <= kWildVariances * variance) return variance;
+    sorted.clear();
+    for (int i = 0; i < n; ++i)
+        if (of.weights[i] > 0) sorted.push_back(x[i]);
+    const auto few =
+        std::max<std::ptrdiff_t>(2, static_cast<std::ptrdiff_t>(kFew * static_cast<double>(sorted.size())));
+    if (static_cast<std::ptrdiff_t>(sorted.size()) <= 2 * few) return variance;
+    std::nth_element(sorted.begin(), sorted.begin() + few, sorted.end());
+    const float low = sorted[static_cast<std::size_t>(few)];
+    std::nth_element(sorted.begin(), sorted.end() - 1 - few, sorted.end());
+    const float high = *(sorted.end() - 1 - few);
+    const float margin = std::max(std::sqrt(square), high - low);
+    const auto wild = [&](int i) { return x[i] < low - margin || x[i] > high + margin; };
+    double known = 0, sum = 0;
+    for (int i = 0; i < n; ++i)
+        if (!wild(i)) {
+            known += static_cast<double>(of.weights[i]);
+            sum += static_cast<double>(of.weights[i] * x[i]);
+        }
+    if (!(known > 0)) return variance;
+    mean = sum / known;
+    for (int i = 0; i < n; ++i)
+        if (wild(i)) x[i] = static_cast<float>(mean);
+    weightedSums(x, of.weights, of.padded, sums);
+    return (sums[1] - sums[0] * sums[0] / of.total) / of.total;
+}
 
 }  // namespace
 
@@ -205,9 +255,11 @@ void Centre::predict(const RandomDrift& drift, float* sums) {
         sum[TilePlanes::plane(out.variance())] += predicted_[k] * krigingVariance;
         sum[TilePlanes::plane(out.leverage())] += predicted_[k] * std::min(1.f, weights_[k] * part);
     }
-    estimates_.resize(static_cast<std::size_t>(4 * padded));
+    estimates_.resize(static_cast<std::size_t>(7 * padded));
     float* const estimate = estimates_.data();
-    float *const about = estimate + padded, *const sum = about + padded, *const square = sum + padded;
+    float *const about = estimate + padded, *const sum = about + padded, *const square = sum + padded,
+                 *const fromFeatures = square + padded;
+    sumFeatureErrors(drift, fromFeatures, padded);
     std::array<float, kMaxRandomDrift> coefficients;
     for (int c = 0; c < tile_.radiance; ++c) {
         double offset = tile_.means[TilePlanes::plane(c) + centre_] + gram(1 + functions_ + c, 0) / total_;
@@ -222,7 +274,30 @@ void Centre::predict(const RandomDrift& drift, float* sums) {
         for (int i = 0; i < n; ++i) about[i] = references[index_[static_cast<std::size_t>(i)]];
         addEstimates(estimate, about, predicted_.data(), n, sum, square);
         scatter(sum, sums + TilePlanes::plane(out.sum(c)));
+        if (c < 3) addProducts(predicted_.data(), fromFeatures + c * padded, n, square);
         if (c < 3) scatter(square, sums + TilePlanes::plane(out.square(c)));
+    }
+}
+
+/// What errors of the features make of R, G, B of each datum, sum over features of b^2 u: both halves have it
+/// in common, so it counts twice in the mean of their variances.
+void Centre::sumFeatureErrors(const RandomDrift& drift, float* out, int padded) const {
+    std::fill_n(out, 3 * padded, 0.f);
+    for (std::size_t j = 0; j < used_.size(); ++j) {
+        const int f = used_[j] - 1 - kPositionFunctions;
+        if (f < 0 || featureNoise_[static_cast<std::size_t>(f)] == 0) continue;
+        const float* errors =
+            tile_.features +
+            TilePlanes::plane(FeaturePlanes{tile_.featureCount}.error(varying_[static_cast<std::size_t>(f)]));
+        float square[3];
+        for (int c = 0; c < 3; ++c) {
+            const double b = drift.coefficients(static_cast<Eigen::Index>(j), c) * unit_[j];
+            square[c] = 2 * kPredictedFeatureError * static_cast<float>(b * b);
+        }
+        for (int i = 0; i < size(); ++i) {
+            const float error = errors[index_[static_cast<std::size_t>(i)]];
+            for (int c = 0; c < 3; ++c) out[c * padded + i] += square[c] * error;
+        }
     }
 }
 

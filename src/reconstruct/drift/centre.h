@@ -52,6 +52,7 @@ class Centre {
     RandomDrift fit();
     void limitFunctions();
     void predict(const RandomDrift& drift, float* sums);
+    void sumFeatureErrors(const RandomDrift& drift, float* out, int padded) const;
     void scatter(const float* values, float* to) const;
 
     TilePlanes tile_;

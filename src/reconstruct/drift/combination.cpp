@@ -71,7 +71,7 @@ void Combination::momentsRow(int y) {
     }
 }
 
-void Combination::combineRow(int y) {
+void Combination::combineRow(int y, bool stacking) {
     const int m = candidates(), planes = MomentPlanes{m}.channels();
     const auto w = static_cast<std::size_t>(width_);
     // Moments averaged under a triangular window, first over rows.
@@ -101,7 +101,7 @@ void Combination::combineRow(int y) {
             for (int j = 0; j <= i; ++j) moments.products(i, j) = moments.products(j, i) = sums[at++];
         for (int j = 0; j < m; ++j) moments.agreement[j] = sums[at++];
         for (int j = 0; j < m; ++j) moments.standardError[j] = std::sqrt(sums[at++]);
-        store(x, y, stackingWeights(moments, significance));
+        store(x, y, stacking ? stackingWeights(moments, significance) : Eigen::VectorXd::Zero(m));
     }
 }
 

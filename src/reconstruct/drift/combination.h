@@ -31,8 +31,9 @@ class Combination {
 
     /// Moments of the pixels of row y, each by itself.
     void momentsRow(int y);
-    /// Row y of `combined`. Moments of kStackReach rows around it are there.
-    void combineRow(int y);
+    /// Row y of `combined`; without `stacking` the first model alone. Moments of kStackReach rows around it
+    /// are there.
+    void combineRow(int y, bool stacking);
 
   private:
     int candidates() const { return static_cast<int>(estimates_.size()); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "base/simd.h"
@@ -40,14 +41,14 @@ void forNeighbours(int x, int y, int width, int height, F f) {
 
 }  // namespace
 
-Finishing::Finishing(const SampleLayout& layout, double strength, int scale, const PictureScale& picture,
-                     const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light)
+Finishing::Finishing(const SampleLayout& layout, const Drift& options, const PictureScale& picture,
+                     const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light,
+                     RowRing& common)
     : layout_(layout),
       planes_{layout.radiance},
       combinedPlanes_{layout.radiance},
       cleanPlanes_{layout.radiance},
-      strength_(strength),
-      scale_(scale),
+      options_(options),
       width_(level.width),
       height_(level.height),
       radiance_(layout.radiance),
@@ -57,7 +58,8 @@ Finishing::Finishing(const SampleLayout& layout, double strength, int scale, con
       variances_(level.variances),
       combined_(combined),
       clean_(clean),
-      light_(level.width, level.height, light) {
+      light_(level.width, level.height, light),
+      common_(level.width, level.height, common) {
     for (int c = 0; c < radiance_; ++c)
         colour_.push_back(c == layout.alpha ? -1 : colourOf(layout.names[static_cast<std::size_t>(c)]));
 }
@@ -75,6 +77,7 @@ double Finishing::sampleVariance(int c, int x, int y) const {
 void Finishing::cleanRow(int y) {
     for (int c = 0; c < radiance_; ++c)
         std::copy_n(combined_.row(combinedPlanes_.value() + c, y), width_, clean_.row(c, y));
+    if (!options_.steps.outliers) return;
     const auto value = [&](int c, int x, int row) {
         return static_cast<double>(combined_.row(combinedPlanes_.value() + c, row)[x]);
     };
@@ -124,13 +127,14 @@ void Finishing::cleanRow(int y) {
 
 void Finishing::errorRow(int y) {
     Light::Row row(width_);
+    std::vector<float> unexplained(static_cast<std::size_t>(width_)), known(unexplained.size());
     for (int x = 0; x < width_; ++x) {
         const double n = data_.row(planes_.count(), y)[x];
         const double leverage = combined_.row(combinedPlanes_.leverage(), y)[x];
         const bool twoHalves =
             data_.row(planes_.halfCount(0), y)[x] > 0 && data_.row(planes_.halfCount(1), y)[x] > 0;
         const bool exact = isExact(x, y);
-        double shared[3];
+        double shared[3], inCommon[3];
         sharedVariance(x, y, shared);
         for (int c = 0; c < 3; ++c) {
             // The noise of the halves' common data is estimated twice, by what the halves differ in and by
@@ -146,6 +150,7 @@ void Finishing::errorRow(int y) {
                 variance +=
                     leverage * leverage * std::max(0.0, apart * apart / 4 - 4 * meanVariance(c, x, y));
             }
+            inCommon[c] = variance - shared[c];
             clean_.row(cleanPlanes_.variance() + c, y)[x] = static_cast<float>(exact ? 0 : variance);
             if (exact || n == 0) continue;  // nothing is missing, or nobody knows
             const auto i = static_cast<std::size_t>(x);
@@ -155,19 +160,43 @@ void Finishing::errorRow(int y) {
             row.lost[c][i] = lost;
             row.missing[c][i] = static_cast<float>(plainMean(data_, planes_, c, x, y)) + lost - value;
         }
+        if (!twoHalves || exact) continue;
+        if (const std::optional<double> more = commonError(x, y, inCommon)) {
+            unexplained[static_cast<std::size_t>(x)] = static_cast<float>(*more);
+            known[static_cast<std::size_t>(x)] = 1;
+        }
     }
     light_.sumRow(y, row);
+    common_.sumRow(y, unexplained, known);
+}
+
+/// What the product of the halves' residuals in units of noise, the mean over colours, has more than
+/// `predicted`, the part of the error variance that the halves have in common. Nothing where the dump states
+/// that there is no noise.
+std::optional<double> Finishing::commonError(int x, int y, const double* predicted) const {
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) {
+        const auto residual = [&](int half) {
+            return static_cast<double>(data_.row(planes_.mean(half) + c, y)[x]) -
+                   static_cast<double>(combined_.row(combinedPlanes_.half(half) + c, y)[x]);
+        };
+        const double variance = meanVariance(c, x, y);
+        if (!(variance > 0)) return {};
+        sum += (residual(0) * residual(1) - predicted[c]) / variance / 3;
+    }
+    return sum;
 }
 
 Finishing::Counts Finishing::outputRow(int y, float* out) const {
     const Light::Shares shares = light_.shares(y);
+    const std::vector<double> common = common_.shares(y);
     Counts counts;
     for (int x = 0; x < width_; ++x, out += radiance_ + 3) {
         const auto i = static_cast<std::size_t>(x);
         const double n = data_.row(planes_.count(), y)[x];
         const bool exact = isExact(x, y);
         counts.exact += exact;
-        const double strength = n > 0 ? strength_ : 1;
+        const double strength = n > 0 ? options_.strength : 1;
         // What the pixel takes of the light that is missing: of R, G, B, and of all of them.
         double moved[3] = {}, all = 0, light = 0;
         for (int c = 0; c < 3; ++c) {
@@ -175,8 +204,9 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             // Not of what is not known for want of samples: those around have none of it.
             const double variance =
                 static_cast<double>(clean_.row(cleanPlanes_.variance() + c, y)[x]) - gapVariance(c, x, y);
-            moved[c] =
-                Light::step(shares.moved[c][i], value, variance, Light::lostVariance(shares, i, value));
+            if (options_.steps.light)
+                moved[c] =
+                    Light::step(shares.moved[c][i], value, variance, Light::lostVariance(shares, i, value));
             all += moved[c];
             light += std::max(0.0, value);
         }
@@ -198,7 +228,8 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             if (c >= 3) continue;
             image[c] = out[c];
             const double variance = static_cast<double>(clean_.row(cleanPlanes_.variance() + c, y)[x]) +
-                                    moved[c] * moved[c] + Light::lostVariance(shares, i, value);
+                                    common[i] * meanVariance(c, x, y) + moved[c] * moved[c] +
+                                    Light::lostVariance(shares, i, value);
             out[radiance_ + c] =
                 static_cast<float>(exact ? 0
                                          : std::sqrt(strength * std::max(kLeastVariance, variance) +
@@ -217,7 +248,7 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
 
 double Finishing::gapVariance(int c, int x, int y) const {
     const double gap = data_.row(planes_.gap(), y)[x];
-    return gap > 0 ? picture_.semivarianceAt(c, gap / scale_) : 0;
+    return gap > 0 ? picture_.semivarianceAt(c, gap / options_.scale) : 0;
 }
 
 double Finishing::meanVariance(int c, int x, int y) const {

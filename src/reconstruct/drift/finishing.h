@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "reconstruct/common/picture_scale.h"
+#include "reconstruct/drift/common_error.h"
 #include "reconstruct/drift/level.h"
 #include "reconstruct/drift/light.h"
 
@@ -15,17 +17,19 @@ class Finishing {
   public:
     static constexpr int kAlikeReach = 2;  ///< of the error map: 5 x 5 pixels
 
-    /// `combined`: CombinedPlanes, instead of the level's own; `clean`: CleanPlanes; `light`: LightPlanes.
-    Finishing(const SampleLayout& layout, double strength, int scale, const PictureScale& picture,
-              const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light);
+    /// `combined`: CombinedPlanes, instead of the level's own; `clean`: CleanPlanes; `light`: LightPlanes;
+    /// `common`: CommonErrorPlanes.
+    Finishing(const SampleLayout& layout, const Drift& options, const PictureScale& picture,
+              const LevelRows& level, const RowRing& combined, RowRing& clean, RowRing& light,
+              RowRing& common);
 
     /// Row y of `clean`: a pixel beyond the range of its eight neighbours moves towards them, by what its own
     /// noise explains of how far: shrinkage(beyond^2, h^2 sum over colours of v / n), h its leverage and v
     /// the variance of a sample, or the mean of it over 3 x 3 pixels. All channels move by the same weight,
     /// along the line to the neighbour nearest to the range's border. Combined rows y - 1 to y + 1 are there.
     void cleanRow(int y);
-    /// The variance of row y of `clean`, and row y of `light`. Clean row y and combined rows y - kAlikeReach
-    /// to y + kAlikeReach are there.
+    /// The variance of row y of `clean`, and row y of `light` and `common`. Clean row y and combined rows y -
+    /// kAlikeReach to y + kAlikeReach are there.
     void errorRow(int y);
     struct Counts {
         std::int64_t exact = 0;  ///< pixels
@@ -44,18 +48,20 @@ class Finishing {
     void sharedVariance(int x, int y, double* variance) const;
     double meanVariance(int c, int x, int y) const;
     double gapVariance(int c, int x, int y) const;
+    std::optional<double> commonError(int x, int y, const double* predicted) const;
 
     const SampleLayout& layout_;
     DataPlanes planes_;
     CombinedPlanes combinedPlanes_;
     CleanPlanes cleanPlanes_;
-    double strength_;
-    int scale_, width_, height_, radiance_;
+    const Drift& options_;
+    int width_, height_, radiance_;
     std::vector<int> colour_;  // of each radiance channel: 0 to 2, or -1: none of these
     const PictureScale& picture_;
     const RowRing &data_, &features_, &variances_, &combined_;
     RowRing& clean_;
     Light light_;
+    CommonError common_;
 };
 
 }  // namespace vlx

@@ -95,6 +95,11 @@ VLX_WIDE void predictRow(const float* x, const float* coefficients, int function
     }
 }
 
+VLX_WIDE void addProducts(const float* __restrict weights, const float* __restrict values, int n,
+                          float* __restrict sums) {
+    for (int i = 0; i < n; ++i) sums[i] += weights[i] * values[i];
+}
+
 VLX_WIDE void addEstimates(const float* __restrict estimates, const float* __restrict references,
                            const float* __restrict weights, int n, float* __restrict sums,
                            float* __restrict squares) {

@@ -20,6 +20,9 @@ float farthest(const float* x, const float* w, int n, float mean);
 void predictRow(const float* x, const float* coefficients, int functions, int stride, int n, float offset,
                 float* estimates);
 
+/// sums[i] += weights[i] values[i].
+void addProducts(const float* weights, const float* values, int n, float* sums);
+
 /// What an estimate e of a pixel adds to sums about a reference r: sums[i] = w (e - r), squares[i] = w (e -
 /// r)^2.
 void addEstimates(const float* estimates, const float* references, const float* weights, int n, float* sums,

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "reconstruct/drift/prefilter.h"
-#include "reconstruct/drift/stacking.h"
 #include "variolux/base/parallel.h"
 
 namespace vlx {
@@ -22,9 +21,11 @@ constexpr int kCombinedRows = 96;
 
 }  // namespace
 
-Level::Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models, int width, int height,
-             int ahead, const PictureScale& picture, Source source, DriftReport& report, StageClock& clock)
+Level::Level(const SampleLayout& layout, const DriftSteps& steps, std::vector<NeighbourhoodModel> models,
+             int width, int height, int ahead, const PictureScale& picture, Source source,
+             DriftReport& report, StageClock& clock)
     : layout_(layout),
+      steps_(steps),
       models_(std::move(models)),
       width_(width),
       height_(height),
@@ -76,8 +77,8 @@ void Level::prefilter(int until) {
         source_(featureRows_ + kTile + kTileMargin);
         const int y = featureRows_;
         parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
-            prefilterFeatures(pixels_.raw, layout_, static_cast<int>(tile) * kTile, y, width_, height_,
-                              features_);
+            prefilterFeatures(pixels_.raw, layout_, steps_.prefilter, static_cast<int>(tile) * kTile, y,
+                              width_, height_, features_);
         });
         featureRows_ = std::min(height_, featureRows_ + kTile);
         clock_.addTo("features");
@@ -92,8 +93,8 @@ void Level::smooth(int until) {
     source_(until + kVarianceReach);
     parallelFor(varianceRows_, until, [&](std::int64_t y) {
         smoothVariances(pixels_.squares, pixels_.data, {radiance_}, features_, layout_.features, picture_,
-                        wider_ ? &wider_->variances_ : nullptr, static_cast<int>(y), width_, height_,
-                        variances_);
+                        steps_.unseen, wider_ ? &wider_->variances_ : nullptr, static_cast<int>(y), width_,
+                        height_, variances_);
     });
     varianceRows_ = until;
     clock_.addTo("variances");
@@ -139,7 +140,6 @@ void Level::finish(int until) {
     parallelFor(finishedRows_, until, [&](std::int64_t y) {
         for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
         fillGaps(static_cast<int>(y));
-        if (models_.size() > 1) shrinkRow(static_cast<int>(y));
         combination_.momentsRow(static_cast<int>(y));
     });
     finishedRows_ = until;
@@ -213,42 +213,13 @@ void Level::fillGaps(int y) {
     }
 }
 
-/// The first model towards the small one, pixel by pixel, by how much of their difference noise explains: a
-/// pixel with unlike features all around is left with its own noisy mean. That noise is estimated twice, by
-/// what the first model's halves differ in and by what the pixel's own noise makes of their difference: half
-/// of each. The one is nothing where halves agree by chance, the other where a few alike pixels make both
-/// models speckled.
-void Level::shrinkRow(int y) {
-    RowRing &first = estimates_.front(), &small = estimates_.back();
-    const ModelPlanes planes{radiance_};
-    for (int x = 0; x < width_; ++x) {
-        const double n = std::max(1.f, pixels_.data.row(DataPlanes{radiance_}.count(), y)[x]);
-        double apart = 0, noise = 0, halves = 0;
-        for (int c = 0; c < 3; ++c) {
-            const double a = first.row(c, y)[x], b = first.row(radiance_ + c, y)[x];
-            const double d = (a + b - small.row(c, y)[x] - small.row(radiance_ + c, y)[x]) / 2;
-            apart += d * d;
-            noise += static_cast<double>(variances_.row(c, y)[x]) / n;
-            halves += (a - b) * (a - b) / 4;
-        }
-        float* const leverage = first.row(planes.leverage(), y) + x;
-        const double more = std::max(0.f, *leverage - small.row(planes.leverage(), y)[x]);
-        const auto kept = static_cast<float>(shrinkage(apart, (halves + more * more * noise) / 2));
-        for (int k = 0; k < 2 * radiance_; ++k) {
-            const float towards = small.row(k, y)[x];
-            first.row(k, y)[x] = towards + kept * (first.row(k, y)[x] - towards);
-        }
-        *leverage = kept * *leverage + (1 - kept) * small.row(planes.leverage(), y)[x];
-    }
-}
-
 void Level::combine(int until) {
     until = std::min(until, height_);
     while (combinedRows_ < until) {  // few rows at a time: the rings hold no more
         const int end = std::min(until, combinedRows_ + kTile);
         finish(end + kStackReach);
         parallelFor(combinedRows_, end,
-                    [&](std::int64_t y) { combination_.combineRow(static_cast<int>(y)); });
+                    [&](std::int64_t y) { combination_.combineRow(static_cast<int>(y), steps_.stacking); });
         combinedRows_ = end;
         clock_.addTo("combining");
     }

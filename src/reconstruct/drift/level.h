@@ -30,10 +30,10 @@ class Level {
     /// What fills pixels() up to (not including) a row, which may lie below the picture.
     using Source = std::function<void(int until)>;
 
-    /// `ahead`: rows that the source may fill beyond what this level asks for. The last model is the small
-    /// one, which the first is shrunk towards.
-    Level(const SampleLayout& layout, std::vector<NeighbourhoodModel> models, int width, int height,
-          int ahead, const PictureScale& picture, Source source, DriftReport& report, StageClock& clock);
+    /// `ahead`: rows that the source may fill beyond what this level asks for.
+    Level(const SampleLayout& layout, const DriftSteps& steps, std::vector<NeighbourhoodModel> models,
+          int width, int height, int ahead, const PictureScale& picture, Source source, DriftReport& report,
+          StageClock& clock);
     Level(const Level&) = delete;
     Level& operator=(const Level&) = delete;
 
@@ -58,9 +58,9 @@ class Level {
     void finish(int until);
     void finishRow(std::size_t m, int y);
     void fillGaps(int y);
-    void shrinkRow(int y);
 
     const SampleLayout& layout_;
+    DriftSteps steps_;
     std::vector<NeighbourhoodModel> models_;
     int width_, height_, radiance_;
     const PictureScale& picture_;

@@ -1,37 +1,11 @@
 #include "reconstruct/drift/light.h"
 
 #include <algorithm>
-#include <cstdlib>
 
-#include "base/simd.h"
+#include "reconstruct/common/window_sum.h"
 #include "reconstruct/drift/stacking.h"
 
 namespace vlx {
-
-namespace {
-
-/// Smooth to the window's border, which would show where much light comes back.
-float weightAt(int d, int reach) {
-    const double u = static_cast<double>(d) / (reach + 1), v = 1 - u * u;
-    return static_cast<float>(v * v);
-}
-
-VLX_WIDE void addScaled(const float* __restrict in, float weight, int n, float* __restrict out) {
-    for (int i = 0; i < n; ++i) out[i] += weight * in[i];
-}
-
-/// out[i] = sum of g(d) in[i + d], g squared where asked for.
-void sumAround(const std::vector<float>& in, int reach, bool squared, float* out) {
-    const auto n = static_cast<int>(in.size());
-    std::fill_n(out, n, 0.f);
-    for (int d = -std::min(reach, n - 1); d <= std::min(reach, n - 1); ++d) {
-        const float g = weightAt(d, reach);
-        const int first = std::max(0, -d), count = n - std::abs(d);
-        addScaled(in.data() + first + d, squared ? g * g : g, count, out + first);
-    }
-}
-
-}  // namespace
 
 Light::Row::Row(int width) {
     for (auto* planes : {value, deviation, missing, lost})
@@ -67,7 +41,7 @@ Light::Shares Light::shares(int y) const {
     std::vector<double> sums(LightPlanes::kChannels * w);
     for (int row = std::max(0, y - LightReach::kNear); row <= std::min(height_ - 1, y + LightReach::kNear);
          ++row) {
-        const auto g = static_cast<double>(weightAt(row - y, LightReach::kNear));
+        const auto g = static_cast<double>(windowWeight(row - y, LightReach::kNear));
         for (int k = 0; k < LightPlanes::kChannels; ++k) {
             const double weight = LightPlanes::isSquare(k) ? g * g : g;
             const float* in = sums_.row(k, row);

@@ -34,7 +34,7 @@ constexpr int kFinishingRows = 96;  // of 32 that go out together, and the light
 constexpr std::uint64_t kProcessBytes = 150'000'000;
 constexpr std::uint64_t kThreadBytes = 8'000'000;
 
-/// Of a level; the last one is the small one, which the first is shrunk towards.
+/// Of a level.
 std::vector<NeighbourhoodModel> modelsOf(Quality quality, bool coarse) {
     switch (quality) {
         case Quality::Draft:
@@ -77,7 +77,7 @@ class Pipeline {
           planes_{layout_.radiance, layout_.features},
           width_(dump.header().data.width * options.scale),
           height_(dump.header().data.height * options.scale),
-          halved_(std::min(width_, height_) >= kLeastHalved),
+          halved_(options.steps.halfResolution && std::min(width_, height_) >= kLeastHalved),
           readRows_(kReadRows / options.scale),
           radiance_(layout_.radiance),
           drift_(report_.method.emplace<DriftReport>()),
@@ -85,20 +85,21 @@ class Pipeline {
           picture_(measurePictureScale(dump, layout_)),
           gathered_(width_, planes_.channels(), kept(kGatheredRows)),
           fine_(
-              layout_, modelsOf(options.quality, false), width_, height_, halved_ ? kAheadRows : 0, picture_,
-              [this](int until) { fill(until); }, drift_, clock_),
+              layout_, options.steps, modelsOf(options.quality, false), width_, height_,
+              halved_ ? kAheadRows : 0, picture_, [this](int until) { fill(until); }, drift_, clock_),
           pixels_(dump, layout_, planes_, picture_, options.scale, width_, height_,
                   options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
           differences_(width_, halved_ ? DifferencePlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           clean_(width_, CleanPlanes{radiance_}.channels(), kept(kFinishingRows)),
           light_(width_, LightPlanes::kChannels, kept(kFinishingRows)),
-          finishing_(layout_, options.strength, options.scale, picture_, fine_.rows(),
-                     halved_ ? corrected_ : fine_.rows().combined, clean_, light_) {
+          common_(width_, CommonErrorPlanes::kChannels, kept(kFinishingRows)),
+          finishing_(layout_, options, picture_, fine_.rows(), halved_ ? corrected_ : fine_.rows().combined,
+                     clean_, light_, common_) {
         if (halved_) {
             coarse_ = std::make_unique<Level>(
-                layout_, modelsOf(options.quality, true), (width_ + 1) / 2, (height_ + 1) / 2, kAheadRows,
-                picture_, [this](int until) { fill(2 * until); }, drift_, clock_);
+                layout_, options.steps, modelsOf(options.quality, true), (width_ + 1) / 2, (height_ + 1) / 2,
+                kAheadRows, picture_, [this](int until) { fill(2 * until); }, drift_, clock_);
             fine_.lookAt(*coarse_);
             correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
                                                        corrected_);
@@ -171,7 +172,7 @@ class Pipeline {
     std::uint64_t ringBytes() const {
         std::uint64_t bytes = static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(kept(kTile)) *
                               static_cast<std::uint64_t>(radiance_ + 3) * sizeof(float);
-        for (const RowRing* ring : {&gathered_, &differences_, &corrected_, &clean_, &light_})
+        for (const RowRing* ring : {&gathered_, &differences_, &corrected_, &clean_, &light_, &common_})
             bytes += ring->bytes();
         return bytes + fine_.ringBytes() + (coarse_ ? coarse_->ringBytes() : 0);
     }
@@ -344,7 +345,7 @@ class Pipeline {
     PixelData pixels_;
     RowRing differences_, corrected_;
     std::unique_ptr<Correction> correction_;
-    RowRing clean_, light_;
+    RowRing clean_, light_, common_;
     Finishing finishing_;
     std::optional<ResidualField> residuals_;
     int firstRow_ = 0, endRow_ = 0;  // of the band

@@ -61,8 +61,8 @@ double rarityOf(double scatter, double squares, double freedom) {
 
 }  // namespace
 
-void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
-                       RowRing& features) {
+void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, bool clean, int x, int y, int width,
+                       int height, RowRing& features) {
     const int right = std::min(width, x + kTile), bottom = std::min(height, y + kTile);
     PatchTile tile{x, y, 0, {}, {}};
     std::vector<float> scratch, distances(kTile * kTile), weights(kTile), errors(kTileSide * kTileSide);
@@ -96,7 +96,7 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
                 }
         }
         std::vector<float> total(kTile * kTile), sums(static_cast<std::size_t>(2 * channels) * kTile * kTile);
-        for (int dy = -kFeatureReach; noisy && dy <= kFeatureReach; ++dy)
+        for (int dy = -kFeatureReach; noisy && clean && dy <= kFeatureReach; ++dy)
             for (int dx = -kFeatureReach; dx <= kFeatureReach; ++dx) {
                 patchDistances(tile, dx, dy, kFeatureFloor, scratch, distances.data());
                 for (int row = std::max(y, -dy); row < std::min(bottom, height - dy); ++row) {
@@ -121,18 +121,21 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
                 for (int col = x; col < right; ++col) {
                     const auto at = static_cast<std::size_t>((row - y) * kTile + col - x);
                     const int here = (row - y + kTileMargin) * kTileSide + col - x + kTileMargin;
-                    const float w = noisy ? total[at] : 1;
+                    float &value = features.row(first + c, row)[col],
+                          &error = features.row(FeaturePlanes{layout.features}.error(first + c), row)[col];
+                    value = tile.values(c)[here];
+                    error = noisy ? tile.variances(c)[here] : 0;
+                    if (!noisy || !clean) continue;
                     const auto plane = static_cast<std::size_t>(2 * c) * kTile * kTile;
-                    features.row(first + c, row)[col] = noisy ? sums[plane + at] / w : tile.values(c)[here];
-                    features.row(FeaturePlanes{layout.features}.error(first + c), row)[col] =
-                        noisy ? sums[plane + kTile * kTile + at] / (w * w) : 0;
+                    value = sums[plane + at] / total[at];
+                    error = sums[plane + kTile * kTile + at] / (total[at] * total[at]);
                 }
         first = last;
     }
 }
 
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
-                     const RowRing& features, int featureCount, const PictureScale& picture,
+                     const RowRing& features, int featureCount, const PictureScale& picture, bool unseen,
                      const RowRing* wide, int y, int width, int height, RowRing& variances) {
     const auto count = static_cast<std::size_t>(featureCount), w = static_cast<std::size_t>(width);
     std::vector<float> scales(count * w), sums(SquaresPlanes::kChannels * w), weights(w);
@@ -178,7 +181,7 @@ void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlan
                     constexpr double kPicture = 2 * kBorrowedFreedom;
                     variance = (freedom * variance + kPicture * picture.variance[c]) / (freedom + kPicture);
                 }
-                if (!stated)
+                if (!stated && unseen)
                     variance += unseenVariance(sum(SquaresPlanes::kSamples),
                                                agree ? std::max(own, picture.level) : picture.level);
             }

@@ -18,9 +18,9 @@ inline constexpr int kVarianceReach = 5;  ///< and its error variance
 /// [y, y + kTile) at columns [x, x + kTile) (cut to the image): non-local means in each group, weights
 /// exp(-d) of patch_similarity.h. The error variance of what is written is sum w^2 v / (sum w)^2. A group
 /// without noise is copied. The error variance that steers the weights is averaged with that of the 3 x 3
-/// pixels around.
-void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, int y, int width, int height,
-                       RowRing& features);
+/// pixels around. Not `clean`: all are copied, with that error variance.
+void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, bool clean, int x, int y, int width,
+                       int height, RowRing& features);
 
 /// Variance of one sample of R, G, B for the pixels of row y: V = sum w S / F, F = sum w (n - 1), over the
 /// pixels within kVarianceReach, S their sums of squares and n their counts (SquaresPlanes),
@@ -33,13 +33,13 @@ void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, int x, in
 /// what was met there is not denied here, as far as chance explains it:
 ///     V = R V' / (F + R),    R = r' / (1 + 2 F / r'):  2 F / r' is the deviance of none (Poisson).
 ///
-/// unseenVariance() of the sum w n samples is added, of the picture's level; where samples agree, of their
-/// own if that is larger. Where no pixel has two samples, the picture's variance counts as two more pixels;
-/// where none has a neighbour to compare it with, it stands alone. Where the dump states the variances,
-/// nothing is added to them. Writes VariancePlanes: the variances, above 0 but where the dump states 0, and
-/// r (0: nothing scatters).
+/// If `unseen`, unseenVariance() of the sum w n samples is added, of the picture's level; where samples
+/// agree, of their own if that is larger. Where no pixel has two samples, the picture's variance counts as
+/// two more pixels; where none has a neighbour to compare it with, it stands alone. Where the dump states the
+/// variances, nothing is added to them. Writes VariancePlanes: the variances, above 0 but where the dump
+/// states 0, and r (0: nothing scatters).
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
-                     const RowRing& features, int featureCount, const PictureScale& picture,
+                     const RowRing& features, int featureCount, const PictureScale& picture, bool unseen,
                      const RowRing* wide, int y, int width, int height, RowRing& variances);
 
 }  // namespace vlx

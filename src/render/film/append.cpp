@@ -31,8 +31,8 @@ std::uint64_t EarlierDump::samples() const {
     return total;
 }
 
-std::uint32_t EarlierDump::freeReplicate() const {
-    if (!hasReplicates()) return 0;
+std::optional<std::uint32_t> EarlierDump::freeReplicate() const {
+    if (!hasReplicates()) return {};
     constexpr int kRows = 16;
     std::uint32_t next = 0;
     const Window& w = header().data;

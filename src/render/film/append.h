@@ -17,8 +17,8 @@ class EarlierDump {
     bool hasReplicates() const { return findChannel(header(), "sample.replicate") >= 0; }
     /// Samples in the whole file.
     std::uint64_t samples() const;
-    /// Number of the first replicate that is free; 0 without replicates. Reads the whole file once.
-    std::uint32_t freeReplicate() const;
+    /// Number of the first replicate that is free; none without replicates. Reads the whole file once.
+    std::optional<std::uint32_t> freeReplicate() const;
     /// Throws Error unless the picture to be traced is this dump's: same windows and camera.
     void checkSameView(const DumpHeader& traced) const;
     /// The rows of `added` with this dump's samples before the added ones, pixel by pixel.

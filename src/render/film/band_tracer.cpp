@@ -51,8 +51,7 @@ BandTracer::BandTracer(const Integrator& integrator, const RenderOptions& option
       options_(options),
       header_(header),
       whole_(options.crop.value_or(header.display)),
-      seed_(options.seed),
-      firstReplicate_(0) {
+      seed_(options.seed) {
     if (options.earlier == nullptr) return;
     // Numbers of their own: the earlier samples may have used this seed.
     seed_ = hashOf(options.seed, options.earlier->samples(), 0x617070u);

@@ -69,7 +69,7 @@ class BandTracer {
     const DumpHeader& header_;
     Window whole_;  // the picture's part, whatever the band
     std::uint64_t seed_;
-    std::uint32_t firstReplicate_;
+    std::optional<std::uint32_t> firstReplicate_;  // none: without replicates
     std::vector<RegionResult> regions_;
 };
 

@@ -175,19 +175,23 @@ class RegionRefiner {
 
 namespace {
 
-/// The first `count` points of a pixel's randomisation.
-void samplePixel(int column, int row, int count, std::uint32_t replicate, std::uint64_t seed,
+/// The first `count` points of a pixel's randomisation `replicate`, or of its first two by turns.
+void samplePixel(int column, int row, int count, std::optional<std::uint32_t> replicate, std::uint64_t seed,
                  const Shade& shade) {
+    const std::uint32_t first = replicate.value_or(0);
+    const int turns = replicate ? 1 : 2;
     CameraSample s;
     s.column = column;
     s.row = row;
-    s.replicate = replicate;
-    s.seed = pixelSeed(seed, column, row, static_cast<int>(replicate));
-    std::array<Vec2, 4> positions;
+    s.replicate = first;
+    std::array<std::array<Vec2, 4>, 2> positions;
     for (int i = 0; i < count; ++i) {
-        s.index = static_cast<std::uint32_t>(i);
-        if (i % 4 == 0) positions = PathSampler::ofFour(s.seed, s.index, dimension::kPixel);
-        const Vec2 u = positions[s.index % 4];
+        const int turn = i % turns;
+        s.seed = pixelSeed(seed, column, row, static_cast<int>(first) + turn);
+        s.index = static_cast<std::uint32_t>(i / turns);
+        auto& own = positions[static_cast<std::size_t>(turn)];
+        if (s.index % 4 == 0) own = PathSampler::ofFour(s.seed, s.index, dimension::kPixel);
+        const Vec2 u = own[s.index % 4];
         s.x = rasterFloor(static_cast<double>(column) + u.x);
         s.y = rasterFloor(static_cast<double>(row) + u.y);
         shade(s);
@@ -203,6 +207,9 @@ CameraSample sampleInPixel(int column, int row, std::uint64_t seed, std::uint32_
 
 void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_t seed, const Shade& shade) {
     assert(replicates > 0 && spp % replicates == 0);
+    if (replicates == 1)
+        return sampleCounts(
+            window, [&](int, int) { return spp; }, {}, seed, shade);
     for (int row = window.y; row < window.y + window.height; ++row)
         for (int column = window.x; column < window.x + window.width; ++column)
             for (int replicate = 0; replicate < replicates; ++replicate)
@@ -210,8 +217,8 @@ void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_
                             shade);
 }
 
-void sampleCounts(const Window& window, const std::function<int(int, int)>& countAt, std::uint32_t replicate,
-                  std::uint64_t seed, const Shade& shade) {
+void sampleCounts(const Window& window, const std::function<int(int, int)>& countAt,
+                  std::optional<std::uint32_t> replicate, std::uint64_t seed, const Shade& shade) {
     for (int row = window.y; row < window.y + window.height; ++row)
         for (int column = window.x; column < window.x + window.width; ++column)
             samplePixel(column, row, countAt(column, row), replicate, seed, shade);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "render/math/vec.h"
@@ -20,12 +21,15 @@ CameraSample sampleInPixel(int column, int row, std::uint64_t seed, std::uint32_
 inline constexpr int kRegionSize = 4;
 
 /// `spp` samples in each pixel of `window` (at most a region's), in `replicates` independent randomisations
-/// of spp / replicates each: Owen-scrambled Sobol points over the pixel.
+/// of spp / replicates each: Owen-scrambled Sobol points over the pixel. One replicate is two such
+/// randomisations, samples of even and of odd number: independent halves (DumpHeader::independentHalves) are
+/// worth more to the reconstruction, whose error they tell, than points that are spread evenly together.
 void sampleUniformly(const Window& window, int spp, int replicates, std::uint64_t seed, const Shade& shade);
 
-/// As many samples in each pixel as `countAt(column, row)` says, of one randomisation, `replicate`.
-void sampleCounts(const Window& window, const std::function<int(int, int)>& countAt, std::uint32_t replicate,
-                  std::uint64_t seed, const Shade& shade);
+/// As many samples in each pixel as `countAt(column, row)` says, of one randomisation, `replicate`, or of two
+/// by turns.
+void sampleCounts(const Window& window, const std::function<int(int, int)>& countAt,
+                  std::optional<std::uint32_t> replicate, std::uint64_t seed, const Shade& shade);
 
 struct HierarchicalOptions {
     /// Refinement of a cell stops when its residual variance s^2 says that samples at this density give

@@ -34,6 +34,10 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
         header.splatReplicates = options.splatReplicates();
         header.replicatesShare = true;
     }
+    header.independentHalves =
+        options.earlier != nullptr
+            ? options.earlier->header().independentHalves
+            : !options.hierarchical && options.replicates == 1 && options.integrator == IntegratorKind::Path;
     if (!options.integratorReason.empty()) header.extra["integrator"] = options.integratorReason;
     const bool replicates = header.splatReplicates > 1 || options.replicates > 1 ||
                             (options.earlier != nullptr && options.earlier->hasReplicates());
