@@ -78,6 +78,25 @@ TEST(Subset, SameSeedSameFileOtherSeedOthers) {
     EXPECT_GT(choices.size(), 50u);
 }
 
+TEST(Subset, TakesIndependentHalvesByTurns) {
+    const TemporaryFolder folder;
+    TestDump whole = numbered(9);
+    whole.header.independentHalves = true;
+    writeDump(folder / "all.exr", whole);
+    std::multiset<float> found;
+    for (std::uint32_t part = 0; part < 3; ++part) {
+        const SampleBand band = subset(folder, {.samples = 3, .part = part});
+        EXPECT_TRUE(DumpReader(folder / "part.exr").header().independentHalves);
+        for (std::size_t i = 0; i < band.samples(); ++i) {
+            if (i % 3 == 0) continue;
+            ASSERT_NE(static_cast<int>(band.values[0][i]) % 2, static_cast<int>(band.values[0][i - 1]) % 2)
+                << i;
+        }
+        found.insert(band.values[0].begin(), band.values[0].end());
+    }
+    EXPECT_EQ(found, std::multiset<float>(whole.all.values[2].begin(), whole.all.values[2].end()));
+}
+
 TEST(Subset, KeepsWholeReplicatesAndNumbersThemAnew) {
     const TemporaryFolder folder;
     writeDump(folder / "all.exr", numbered(12, 3));

@@ -84,6 +84,25 @@ TEST_F(Appending, KeepsWhatWasThereAndAddsOtherSamples) {
     }
 }
 
+TEST_F(Appending, HalvesStayIndependentWhereTheyWere) {
+    RenderOptions options = small();
+    render("old.exr", options);
+    EXPECT_TRUE(DumpReader(folder / "old.exr").header().independentHalves);
+    const EarlierDump earlier(folder / "old.exr");
+    options.spp = 3;
+    options.earlier = &earlier;
+    render("both.exr", options);
+    EXPECT_TRUE(DumpReader(folder / "both.exr").header().independentHalves);
+    for (const bool hierarchical : {true, false}) {
+        RenderOptions other = small();
+        other.hierarchical = hierarchical;
+        other.replicates = hierarchical ? 1 : 2;
+        render("other.exr", other);
+        EXPECT_FALSE(DumpReader(folder / "other.exr").header().independentHalves);
+        std::filesystem::remove(folder / "other.exr");
+    }
+}
+
 TEST_F(Appending, NewSamplesAreAReplicateOfTheirOwn) {
     RenderOptions options = small();
     options.replicates = 2;
