@@ -11,7 +11,7 @@ namespace vlx {
 void parallelFor(std::int64_t begin, std::int64_t end, const std::function<void(std::int64_t)>& body);
 
 /// Ends the threads that parallelFor() works with, and waits for them; the next call starts others. At the
-/// end of a program: one that is just being started then would be torn down half-made.
+/// end of a program: nothing runs beside its last destructors.
 void endThreads();
 
 /// While it lives, at most `threads` threads work (0: all processors). Made once, in main.
