@@ -47,12 +47,13 @@ void addSteps(CLI::App& app, DriftSteps& steps) {
            [&steps](const std::vector<std::string>& left) {
                for (const std::string& name : left) steps.*names.at(name) = false;
            },
-           "krige: leave out a step, to show what it does (METHOD.md, 7): prefilter of noisy features, "
+           "krige: leave out steps, to show what it does (METHOD.md, 7): prefilter of noisy features, "
            "unseen (what no "
            "sample met, in error variances), stacking of models, half-resolution, outliers, light (given "
            "back); "
            "repeatable")
-        ->option_text("STEP")
+        ->option_text("STEP,...")
+        ->delimiter(',')
         ->check(CLI::IsMember(names))
         ->take_all()
         ->expected(1);

@@ -259,7 +259,10 @@ struct SweepCommand {
                         s.command.c_str());
         }
         for (const SweepRecord& record : sweep.records)
-            if (!record.failure.empty()) code = kFailed;
+            if (!record.failure.empty()) {
+                if (isQuiet()) warn(record.command + ": " + record.failure);  // else told as it happened
+                code = kFailed;
+            }
         return code;
     }
 

@@ -75,8 +75,10 @@ std::string failureOf(const ProcessRun& run) {
     std::string text = run.err;
     text.erase(text.find_last_not_of(" \n") + 1);
     std::size_t start = text.rfind('\n');
-    // Of bad usage the last line names only --help.
-    if (run.exitCode == 2 && start != std::string::npos && start > 0) start = text.rfind('\n', start - 1);
+    if (run.exitCode == 2 && start != std::string::npos) {  // of bad usage the last line names only --help
+        text.erase(start);
+        start = text.rfind('\n');
+    }
     if (start != std::string::npos) text = text.substr(start + 1);
     return "exit code " + std::to_string(run.exitCode) + (text.empty() ? "" : ": " + printable(text));
 }

@@ -69,6 +69,7 @@ class PixelData {
     void limitPixel(int x, int y, LimitedRow& row);
     float halfMean(int half, int c, int x, int y) const;
     float secondBrightest(int x, int y) const;
+    void borrowFeatureErrors(int x, int y) const;
     void borrowSquares(int x, int y, float* squares, float& freedom) const;
 
     const SampleSource& dump_;
