@@ -228,7 +228,7 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
             if (c >= 3) continue;
             image[c] = out[c];
             const double variance = static_cast<double>(clean_.row(cleanPlanes_.variance() + c, y)[x]) +
-                                    common[i] * meanVariance(c, x, y) + moved[c] * moved[c] +
+                                    (n > 0 ? common[i] * meanVariance(c, x, y) : 0) + moved[c] * moved[c] +
                                     Light::lostVariance(shares, i, value);
             out[radiance_ + c] =
                 static_cast<float>(exact ? 0
