@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iostream>
 
+#include "edit/halves.h"
 #include "edit/info.h"
 #include "edit/merge.h"
 #include "edit/subset.h"
@@ -117,6 +118,47 @@ struct SubsetCommand {
     }
 };
 
+struct HalvesCommand {
+    std::string input;
+    std::string prefix;
+
+    void bind(CLI::App& app) {
+        app.description(
+            "Write what other denoisers start from as PFM: the mean of all samples of each pixel, of those "
+            "of even\n"
+            "number and of those of odd number (of even and odd replicates, where there are two or more), "
+            "with albedo\n"
+            "and normal where the dump has them: PREFIX_color.pfm, PREFIX_albedo.pfm, PREFIX_normal.pfm,\n"
+            "PREFIX_even_color.pfm, PREFIX_odd_color.pfm and so on. A denoiser's images of the two halves "
+            "can be judged\n"
+            "by what the other half shows.");
+        app.footer(
+            "Example:\n"
+            "  vlx-pack halves room.exr -o room\n"
+            "  oidnDenoise --hdr room_color.pfm --alb room_albedo.pfm --nrm room_normal.pfm -o denoised.pfm");
+        app.add_option("DUMP", input, "The dump: a deep scanline OpenEXR file, of any renderer")->required();
+        app.add_option("-o,--output", prefix, "What the names of the pictures begin with")
+            ->required()
+            ->option_text("PREFIX");
+    }
+
+    int run() const {
+        vlx::HalvesReport report;
+        {
+            vlx::ProgressBar bar("averaging");
+            report = vlx::writeHalves(input, prefix, bar);
+        }
+        if (report.droppedSamples > 0)
+            vlx::say(std::to_string(report.droppedSamples) + " samples are not finite: left out");
+        if (report.emptyPixels > 0)
+            vlx::say(std::to_string(report.emptyPixels) + " pixels have no samples: they are 0");
+        if (report.missingInHalves > 0)
+            vlx::say(std::to_string(report.missingInHalves) +
+                     " pixels have samples of one half only: both halves show these");
+        return vlx::kDone;
+    }
+};
+
 struct MergeCommand {
     std::vector<std::string> parts;
     std::string output;
@@ -170,6 +212,7 @@ int main(int argc, char** argv) {
     InfoCommand info;
     SampleCommand sample;
     SubsetCommand subset;
+    HalvesCommand halves;
     MergeCommand merge;
     commands.push_back({app.add_subcommand("info"), [&] { return info.run(); }});
     info.bind(*commands.back().app);
@@ -178,6 +221,8 @@ int main(int argc, char** argv) {
     sample.bind(*commands.back().app);
     commands.push_back({app.add_subcommand("subset"), [&] { return subset.run(); }});
     subset.bind(*commands.back().app);
+    commands.push_back({app.add_subcommand("halves"), [&] { return halves.run(); }});
+    halves.bind(*commands.back().app);
     commands.push_back({app.add_subcommand("merge"), [&] { return merge.run(); }});
     merge.bind(*commands.back().app);
     return vlx::runTool(argc, argv, app, [&] {
