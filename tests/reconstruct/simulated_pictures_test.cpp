@@ -248,7 +248,11 @@ TEST(SimulatedPictures, FeaturesOfOneSampleAreNotExact) {
         for (std::size_t c = 3; c < 6; ++c) band.values[c].push_back(static_cast<float>(albedo));
         band.offsets.push_back(band.values[0].size());
     }
-    const Image image = reconstruct(SampleBuffer(header, std::move(band)), Drift{}).image;
+    const SampleBuffer dump(header, std::move(band));
+    const Image image = reconstruct(dump, Drift{}).image;
+    Drift without;
+    without.steps.prefilter = false;
+    EXPECT_NE(reconstruct(dump, without).image.pixels, image.pixels);
     double squares = 0, predicted = 0;
     for (int y = 0; y < kHigh; ++y)
         for (int x = 0; x < kAcross; ++x) {

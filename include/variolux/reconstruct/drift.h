@@ -30,8 +30,7 @@
 /// 4. *No seams*: a neighbourhood predicts all its pixels; a pixel averages the predictions of all
 ///    neighbourhoods that hold it, weighted by w over their noise.
 /// 5. *Models*: medium and strict, large and tolerant, small; they and the pixel's plain mean are combined
-/// per
-///    pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse,
+///    per pixel by stacking (Breiman 1996): convex weights that predict half B from half A and the reverse,
 ///    fitted over about 20 x 20 pixels; the plain mean enters only where it improves by one standard error.
 /// 6. *Half the resolution*: the same data, 2 x 2 pixels as one, are kriged by the same models, C. The
 ///    estimate K becomes K + w (L - K), L = K + up(C - down(K)), with the w in 0 to 1 by which each half's

@@ -26,8 +26,7 @@ struct CrossValidation {
 ///     "distance": "pixels"                             what the variogram's distance is, with its unit
 ///     "pairs": 7140                                    in the cloud (paper) or the classes (default)
 ///     "cloud": [[distance, semivariance], ...]         half squared differences less their noise: an even
-///     choice
-///                                                      of the cloud; the default method has none
+///                                                      choice of the cloud; the default method has none
 ///     "classes": [{"distance", "semivariance", "standardError", "pairs"}, ...]
 ///     "model": null, or {"nugget", "structures": [{"type", "sill", "range", "shape"}, ...],
 ///                        "curve": [[distance, semivariance], ...]}

@@ -17,7 +17,8 @@ constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this man
 // Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
 // than their prefilter says. Twice the standard deviation.
 constexpr double kFeatureErrorFactor = 4;
-// Of a prediction: between the prefilter's own error variance and the four times that D allows for.
+// Of a prediction: between the prefilter's own error variance and the four times that D allows for (of 1, 2
+// and 4 chosen by looking at five cases and five stress scenes).
 constexpr float kPredictedFeatureError = 2;
 constexpr int kPriorIterations = 4;
 
