@@ -146,8 +146,8 @@ double rareNoise(std::mt19937_64& random, int) {
 }
 
 // Normal errors are 68.3 and 95.4 % within one and two. A field that is rougher than the drift (this
-// covariance has a cusp) is what the halves have wrong alike: without common_error.h a third to two thirds of
-// it was told.
+// covariance has a cusp) is what the halves have wrong alike: without common_error.h 0.14 to 0.59 of it
+// are told.
 TEST(SimulatedPictures, ErrorsAreCoveredAtAnyRange) {
     for (const double range : {4.0, 12.0, 40.0})
         for (const int spp : {8, 32}) {
