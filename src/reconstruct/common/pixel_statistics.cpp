@@ -284,6 +284,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
             const int f = static_cast<int>(c - radiance);
             put(planes.feature() + f, n > 0 ? first[c] + total / n : 0);
             put(planes.featureError() + f, n > 1 ? squares / (n * (n - 1)) : 0);
+            put(planes.featureDifference() + f, nA > 0 && nB > 0 ? (sum[0][c] / nA - sum[1][c] / nB) / 2 : 0);
         }
         for (std::size_t c = 0; c < radiance; ++c)
             put(planes.brightest() + static_cast<int>(c), taken.empty() ? 0 : value(c, bright));

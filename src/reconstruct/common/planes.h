@@ -19,8 +19,9 @@ struct GatheredPlanes {
     int freedom() const { return squares() + 3; }       ///< degrees of freedom of `squares`
     int stated() const { return squares() + 4; }   ///< 1 where the dump states all error variances, else 0
     int feature() const { return squares() + 5; }  ///< f: means
-    int featureError() const { return feature() + features; }    ///< f: error variances of these means
-    int brightest() const { return featureError() + features; }  ///< r: of the brightest sample
+    int featureError() const { return feature() + features; }           ///< f: error variances of these means
+    int featureDifference() const { return feature() + 2 * features; }  ///< FeaturePlanes' `difference`
+    int brightest() const { return feature() + 3 * features; }          ///< r: of the brightest sample
     int brightestLuminance() const { return brightest() + radiance; }
     int secondLuminance() const { return brightest() + radiance + 1; }
     int brightestHalf() const { return brightest() + radiance + 2; }
@@ -56,6 +57,19 @@ struct FeaturePlanes {
     int value(int f) const { return f; }
     int error(int f) const { return features + f; }  ///< error variance of `value`
     int channels() const { return 2 * features; }
+    /// Of raw features only: half the difference of the halves' means, A less B; 0 where one has no sample.
+    int difference(int f) const { return 2 * features + f; }
+    int rawChannels() const { return 3 * features; }
+};
+
+/// What prefiltering took off the features that each half shows, r_A and r_B, of each group: sums over its
+/// features.
+struct ResidualPlanes {
+    int groups = 0;
+
+    int products(int g) const { return g; }          ///< of r_A r_B
+    int squares(int g) const { return groups + g; }  ///< of ((r_A + r_B) / 2)^2
+    int channels() const { return 2 * groups; }
 };
 
 /// Scatter of one sample, averaged over pixels that are alike.

@@ -14,12 +14,6 @@ constexpr double kLeastFeatureSpread = 1e-8;  // squared: less is a constant
 constexpr double kLeastPositionSpread = 1e-12;
 constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
 constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this many: no datum, but a place
-// Selecting alike values makes their variance look smaller than it is: prefiltered features have more error
-// than their prefilter says. Twice the standard deviation.
-constexpr double kFeatureErrorFactor = 4;
-// Of a prediction: between the prefilter's own error variance and the four times that D allows for (of 1, 2
-// and 4 chosen by looking at five cases and five stress scenes).
-constexpr float kPredictedFeatureError = 2;
 constexpr int kPriorIterations = 4;
 
 constexpr double kWildVariances = 9;  // beyond three standard deviations a value may be wild
@@ -206,7 +200,6 @@ RandomDrift Centre::fit() {
         }
         if (used_[i] > kPositionFunctions)
             moments.normal(a, a) +=
-                kFeatureErrorFactor *
                 featureNoise_[static_cast<std::size_t>(used_[i] - 1 - kPositionFunctions)] * unit_[i] *
                 unit_[i] / variance_;
         for (int c = 0; c < tile_.radiance; ++c)
@@ -293,7 +286,7 @@ void Centre::sumFeatureErrors(const RandomDrift& drift, float* out, int padded) 
         float square[3];
         for (int c = 0; c < 3; ++c) {
             const double b = drift.coefficients(static_cast<Eigen::Index>(j), c) * unit_[j];
-            square[c] = 2 * kPredictedFeatureError * static_cast<float>(b * b);
+            square[c] = 2 * static_cast<float>(b * b);
         }
         for (int i = 0; i < size(); ++i) {
             const float error = errors[index_[static_cast<std::size_t>(i)]];

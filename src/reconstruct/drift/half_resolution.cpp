@@ -63,11 +63,24 @@ void halveRow(const PixelRows& fine, int width, int height, int radiance, int fe
                      [&](int col, int row) { sum += static_cast<double>(fine.squares.row(k, row)[col]); });
             put(coarse.squares, k, sum);
         }
-        for (int k = 0; k < 2 * features; ++k) {
-            double sum = 0;
-            forParts(width, height, x, y,
-                     [&](int col, int row) { sum += static_cast<double>(fine.raw.row(k, row)[col]); });
-            put(coarse.raw, k, sum / (k < features ? parts : parts * parts));
+        const FeaturePlanes raw{features};
+        for (int f = 0; f < features; ++f) {
+            double value = 0, error = 0, ofHalf[2] = {}, known[2] = {};
+            forParts(width, height, x, y, [&](int col, int row) {
+                const double mean = fine.raw.row(raw.value(f), row)[col];
+                const double difference = fine.raw.row(raw.difference(f), row)[col];
+                value += mean;
+                error += static_cast<double>(fine.raw.row(raw.error(f), row)[col]);
+                for (int half = 0; half < 2; ++half) {
+                    if (data.row(planes.halfCount(half), row)[col] <= 0) continue;
+                    ofHalf[half] += half == 0 ? mean + difference : mean - difference;
+                    ++known[half];
+                }
+            });
+            put(coarse.raw, raw.value(f), value / parts);
+            put(coarse.raw, raw.error(f), error / (parts * parts));
+            const bool both = known[0] > 0 && known[1] > 0;
+            put(coarse.raw, raw.difference(f), both ? (ofHalf[0] / known[0] - ofHalf[1] / known[1]) / 2 : 0);
         }
     }
 }

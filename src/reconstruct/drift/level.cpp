@@ -10,11 +10,14 @@ namespace vlx {
 namespace {
 
 // Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them. With
-// tiles of 32 rows, centres that reach 15 and patches that reach 3, data are filled 160 rows ahead of the row
-// that is combined; the others are used up earlier.
-constexpr int kDataRows = 224;
-constexpr int kRawRows = 128;      // and squares
-constexpr int kFeatureRows = 160;  // and variances: finishing looks back at them
+// tiles of 32 rows, centres that reach 15, patches that reach 3 and windows that reach 11, data are filled
+// 252 rows ahead of the row that is combined (measured over bands of tall pictures; builds with assertions
+// notice where it is more); the others are used up earlier.
+constexpr int kDataRows = 256;
+constexpr int kRawRows = 160;       // and squares
+constexpr int kResidualRows = 96;   // a tile's, and kReturnReach around
+constexpr int kFeatureRows = 208;   // finishing looks back at them
+constexpr int kVarianceRows = 160;  // and at these
 constexpr int kSumRows = 128;
 constexpr int kEstimateRows = 64;  // and moments
 constexpr int kCombinedRows = 96;
@@ -36,9 +39,10 @@ Level::Level(const SampleLayout& layout, const DriftSteps& steps, std::vector<Ne
       clock_(clock),
       pixels_{RowRing(width, DataPlanes{radiance_}.channels(), kept(kDataRows + ahead)),
               RowRing(width, SquaresPlanes::kChannels, kept(kRawRows + ahead)),
-              RowRing(width, FeaturePlanes{layout.features}.channels(), kept(kRawRows + ahead))},
+              RowRing(width, FeaturePlanes{layout.features}.rawChannels(), kept(kRawRows + ahead))},
       features_(width, FeaturePlanes{layout.features}.channels(), kept(kFeatureRows)),
-      variances_(width, VariancePlanes::kChannels, kept(kFeatureRows)),
+      residuals_(width, ResidualPlanes{layout.groups}.channels(), kept(kResidualRows)),
+      variances_(width, VariancePlanes::kChannels, kept(kVarianceRows)),
       moments_(width, MomentPlanes{static_cast<int>(models_.size())}.channels(), kept(kEstimateRows)),
       combined_(width, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
       combination_(radiance_, width, height, pixels_.data, variances_, estimates_, moments_, combined_) {
@@ -55,14 +59,15 @@ int Level::startAbove(int first) {
     krigedRows_ = tileAbove(finishedRows_ - kMaxReach);
     zeroedRows_ = std::max(0, krigedRows_ - kMaxReach);
     varianceRows_ = std::max(0, krigedRows_ - kTileMargin);
-    featureRows_ = tileAbove(varianceRows_ - kVarianceReach);
-    return std::max(0, featureRows_ - kTileMargin);
+    featureRows_ = std::max(0, varianceRows_ - kVarianceReach);
+    prefilteredRows_ = tileAbove(featureRows_ - kReturnReach);
+    return std::max(0, prefilteredRows_ - kTileMargin);
 }
 
 std::uint64_t Level::ringBytes() const {
     std::uint64_t bytes = 0;
-    for (const RowRing* ring :
-         {&pixels_.data, &pixels_.squares, &pixels_.raw, &features_, &variances_, &moments_, &combined_})
+    for (const RowRing* ring : {&pixels_.data, &pixels_.squares, &pixels_.raw, &features_, &residuals_,
+                                &variances_, &moments_, &combined_})
         bytes += ring->bytes();
     for (const auto* list : {&sums_, &estimates_})
         for (const RowRing& ring : *list) bytes += ring.bytes();
@@ -74,13 +79,22 @@ std::uint64_t Level::ringBytes() const {
 void Level::prefilter(int until) {
     until = std::min(until, height_);
     while (featureRows_ < until) {
-        source_(featureRows_ + kTile + kTileMargin);
-        const int y = featureRows_;
-        parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
-            prefilterFeatures(pixels_.raw, layout_, steps_.prefilter, static_cast<int>(tile) * kTile, y,
-                              width_, height_, features_);
+        const int ahead = std::min(height_, featureRows_ + 1 + kReturnReach);
+        while (prefilteredRows_ < ahead) {
+            const int y = prefilteredRows_;
+            source_(y + kTile + kTileMargin);
+            parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
+                prefilterFeatures(pixels_.raw, pixels_.data, {radiance_}, layout_, steps_.prefilter,
+                                  static_cast<int>(tile) * kTile, y, width_, height_, features_, residuals_);
+            });
+            prefilteredRows_ = std::min(height_, y + kTile);
+        }
+        const int end = prefilteredRows_ == height_ ? height_ : prefilteredRows_ - kReturnReach;
+        parallelFor(featureRows_, end, [&](std::int64_t y) {
+            returnResiduals(pixels_.raw, residuals_, layout_, static_cast<int>(y), width_, height_,
+                            features_);
         });
-        featureRows_ = std::min(height_, featureRows_ + kTile);
+        featureRows_ = end;
         clock_.addTo("features");
     }
 }

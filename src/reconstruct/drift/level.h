@@ -68,13 +68,13 @@ class Level {
     DriftReport& report_;
     StageClock& clock_;
     PixelRows pixels_;
-    RowRing features_, variances_;
+    RowRing features_, residuals_, variances_;
     std::vector<RowRing> sums_, estimates_;  // of each model; estimates_: ModelPlanes
     RowRing moments_, combined_;
     Combination combination_;
     Level* wider_ = nullptr;
-    int featureRows_ = 0, varianceRows_ = 0, krigedRows_ = 0, zeroedRows_ = 0, finishedRows_ = 0,
-        combinedRows_ = 0;
+    int prefilteredRows_ = 0, featureRows_ = 0, varianceRows_ = 0, krigedRows_ = 0, zeroedRows_ = 0,
+        finishedRows_ = 0, combinedRows_ = 0;
 };
 
 }  // namespace vlx

@@ -40,7 +40,7 @@ LimitedRow PixelData::fillRow(int y) {
         out_.data.row(dataPlanes_.gap(), y)[x] = hole ? fillHole(x, y, row) : 0;
         limitPixel(x, y, row);
     }
-    for (int k = 0; k < 2 * layout_.features; ++k)
+    for (int k = 0; k < FeaturePlanes{layout_.features}.rawChannels(); ++k)
         std::copy_n(gathered_.row(planes_.feature() + k, y), width_, out_.raw.row(k, y));
     for (int x = 0; x < width_; ++x)
         if (gathered_.row(planes_.count(), y)[x] == 1 && gathered_.row(planes_.stated(), y)[x] == 0)
@@ -76,7 +76,7 @@ float PixelData::fillHole(int x, int y, LimitedRow& row) {
             gathered_.row(planes_.mean(0) + c, y)[x] = nA > 0 ? a : mean;
             gathered_.row(planes_.mean(1) + c, y)[x] = n > nA ? b : mean;
         }
-        for (int k = planes_.feature(); k < planes_.feature() + 2 * layout_.features; ++k)
+        for (int k = planes_.feature(); k < planes_.brightest(); ++k)
             gathered_.row(k, y)[x] = gathered_.row(k, from.y)[from.x];
         return from.distance;
     }

@@ -4,12 +4,15 @@
 #include <cmath>
 
 #include "base/simd.h"
+#include "reconstruct/common/window_sum.h"
 
 namespace vlx {
 
 namespace {
 
-constexpr float kFeatureFloor = 1e-4f;  // differences of a hundredth of a feature's scale are none
+constexpr float kFeatureFloor = 1e-6f;  // differences of a thousandth of a feature's scale are none
+// Standard errors by which residuals that both halves show must exceed chance; every window is looked at.
+constexpr float kReturnSignificance = 3;
 
 /// weights[i] = simd::nearExp(max(0, d[i])), summed into `total`, and into sums of each value and variance.
 VLX_WIDE void accumulate(const float* __restrict distances, int count, const float* const* values,
@@ -59,78 +62,170 @@ double rarityOf(double scatter, double squares, double freedom) {
     return scatter > 0 && std::isfinite(rarity) ? rarity : 0;
 }
 
-}  // namespace
+/// Of a tile: sums of weights, and of what is weighted and its variance.
+class WeightedSums {
+  public:
+    explicit WeightedSums(int channels) : sums_(static_cast<std::size_t>(2 * channels + 1) * kTile * kTile) {}
+    float* total() { return sums_.data(); }
+    float* value(int channel) { return sums_.data() + (1 + 2 * channel) * kTile * kTile; }
+    float* variance(int channel) { return sums_.data() + (2 + 2 * channel) * kTile * kTile; }
 
-void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, bool clean, int x, int y, int width,
-                       int height, RowRing& features) {
-    const int right = std::min(width, x + kTile), bottom = std::min(height, y + kTile);
-    PatchTile tile{x, y, 0, {}, {}};
-    std::vector<float> scratch, distances(kTile * kTile), weights(kTile), errors(kTileSide * kTileSide);
-    for (int first = 0; first < layout.features;) {
-        int last = first;
-        while (last < layout.features &&
-               layout.group[static_cast<std::size_t>(last)] == layout.group[static_cast<std::size_t>(first)])
-            ++last;
-        const int channels = last - first;
-        tile.channels = channels;
-        tile.value.resize(static_cast<std::size_t>(channels) * kTileSide * kTileSide);
-        tile.variance.resize(tile.value.size());
-        bool noisy = false;
-        for (int c = 0; c < channels; ++c) {
-            copyTile(raw, first + c, x, y, width, height, tile.values(c));
-            copyTile(raw, FeaturePlanes{layout.features}.error(first + c), x, y, width, height,
-                     errors.data());
-            float* out = tile.variances(c);
-            for (int row = 0; row < kTileSide; ++row)
-                for (int i = 0; i < kTileSide; ++i) {
-                    float sum = 0;
-                    int count = 0;
-                    for (int r = std::max(0, row - 1); r <= std::min(kTileSide - 1, row + 1); ++r)
-                        for (int k = std::max(0, i - 1); k <= std::min(kTileSide - 1, i + 1); ++k) {
-                            sum += errors[static_cast<std::size_t>(r * kTileSide + k)];
-                            ++count;
-                        }
-                    const float own = errors[static_cast<std::size_t>(row * kTileSide + i)];
-                    out[row * kTileSide + i] = 0.5f * (own + sum / static_cast<float>(count));
-                    noisy = noisy || own > 0;
-                }
-        }
-        std::vector<float> total(kTile * kTile), sums(static_cast<std::size_t>(2 * channels) * kTile * kTile);
-        for (int dy = -kFeatureReach; noisy && clean && dy <= kFeatureReach; ++dy)
-            for (int dx = -kFeatureReach; dx <= kFeatureReach; ++dx) {
-                patchDistances(tile, dx, dy, kFeatureFloor, scratch, distances.data());
-                for (int row = std::max(y, -dy); row < std::min(bottom, height - dy); ++row) {
-                    const int begin = std::max(x, -dx), end = std::min(right, width - dx);
-                    if (begin >= end) continue;
-                    const int at = (row - y) * kTile + begin - x;
-                    const int there = (row - y + kTileMargin + dy) * kTileSide + begin - x + kTileMargin + dx;
-                    const float *values[3] = {}, *variances[3] = {};
-                    float *s[3] = {}, *q[3] = {};
-                    for (int c = 0; c < channels; ++c) {
-                        values[c] = tile.values(c) + there;
-                        variances[c] = tile.variances(c) + there;
-                        s[c] = sums.data() + (2 * c) * kTile * kTile + at;
-                        q[c] = sums.data() + (2 * c + 1) * kTile * kTile + at;
+  private:
+    std::vector<float> sums_;
+};
+
+/// The features [first, first + channels) of a tile as each half has them: twice the error variance of both,
+/// averaged with that of the 3 x 3 pixels around; a pixel of one sample is its own in both. Whether any has
+/// noise.
+bool splitFeatures(const RowRing& raw, const FeaturePlanes& planes, int first, int channels,
+                   const std::vector<float>& counts, int width, int height, PatchTile* halves) {
+    std::vector<float> value(kTileSide * kTileSide), error(value.size()), difference(value.size());
+    bool noisy = false;
+    for (int h = 0; h < 2; ++h) {
+        halves[h].channels = channels;
+        halves[h].value.resize(static_cast<std::size_t>(channels) * value.size());
+        halves[h].variance.resize(halves[h].value.size());
+    }
+    for (int c = 0; c < channels; ++c) {
+        const auto copy = [&](int plane, std::vector<float>& out) {
+            copyTile(raw, plane, halves[0].x, halves[0].y, width, height, out.data());
+        };
+        copy(planes.value(first + c), value);
+        copy(planes.error(first + c), error);
+        copy(planes.difference(first + c), difference);
+        for (int row = 0; row < kTileSide; ++row)
+            for (int i = 0; i < kTileSide; ++i) {
+                float sum = 0;
+                int count = 0;
+                for (int r = std::max(0, row - 1); r <= std::min(kTileSide - 1, row + 1); ++r)
+                    for (int k = std::max(0, i - 1); k <= std::min(kTileSide - 1, i + 1); ++k) {
+                        sum += error[static_cast<std::size_t>(r * kTileSide + k)];
+                        ++count;
                     }
-                    accumulate(distances.data() + at, end - begin, values, variances, channels,
-                               weights.data(), total.data() + at, s, q);
+                const auto at = static_cast<std::size_t>(row * kTileSide + i);
+                const float both = 0.5f * (error[at] + sum / static_cast<float>(count));
+                noisy = noisy || error[at] > 0;
+                for (int h = 0; h < 2; ++h) {
+                    halves[h].values(c)[at] = value[at] + (h == 0 ? difference[at] : -difference[at]);
+                    halves[h].variances(c)[at] = counts[at] <= 1 ? both : 2 * both;
                 }
             }
-        for (int c = 0; c < channels; ++c)
-            for (int row = y; row < bottom; ++row)
-                for (int col = x; col < right; ++col) {
-                    const auto at = static_cast<std::size_t>((row - y) * kTile + col - x);
-                    const int here = (row - y + kTileMargin) * kTileSide + col - x + kTileMargin;
-                    float &value = features.row(first + c, row)[col],
-                          &error = features.row(FeaturePlanes{layout.features}.error(first + c), row)[col];
-                    value = tile.values(c)[here];
-                    error = noisy ? tile.variances(c)[here] : 0;
-                    if (!noisy || !clean) continue;
-                    const auto plane = static_cast<std::size_t>(2 * c) * kTile * kTile;
-                    value = sums[plane + at] / total[at];
-                    error = sums[plane + kTile * kTile + at] / (total[at] * total[at]);
+    }
+    return noisy;
+}
+
+VLX_WIDE void addResiduals(const float* __restrict products, const float* __restrict squares, float weight,
+                           int n, float* __restrict sum, float* __restrict sumOfSquares,
+                           float* __restrict square) {
+    for (int i = 0; i < n; ++i) {
+        sum[i] += weight * products[i];
+        sumOfSquares[i] += weight * weight * products[i] * products[i];
+        square[i] += weight * squares[i];
+    }
+}
+
+}  // namespace
+
+void prefilterFeatures(const RowRing& raw, const RowRing& data, const DataPlanes& dataPlanes,
+                       const SampleLayout& layout, bool clean, int x, int y, int width, int height,
+                       RowRing& features, RowRing& residuals) {
+    const int right = std::min(width, x + kTile), bottom = std::min(height, y + kTile);
+    const FeaturePlanes planes{layout.features};
+    const ResidualPlanes residual{layout.groups};
+    PatchTile halves[2] = {{x, y, 0, {}, {}}, {x, y, 0, {}, {}}};
+    std::vector<float> counts(kTileSide * kTileSide), scratch, distances(kTile * kTile), weights(kTile);
+    copyTile(data, dataPlanes.count(), x, y, width, height, counts.data());
+    for (int first = 0; first < layout.features;) {
+        const int group = layout.group[static_cast<std::size_t>(first)];
+        int last = first;
+        while (last < layout.features && layout.group[static_cast<std::size_t>(last)] == group) ++last;
+        const int channels = last - first;
+        const bool noisy =
+            splitFeatures(raw, planes, first, channels, counts, width, height, halves) && clean;
+        WeightedSums sums[2] = {WeightedSums(channels), WeightedSums(channels)};
+        for (int dy = -kFeatureReach; noisy && dy <= kFeatureReach; ++dy)
+            for (int dx = -kFeatureReach; dx <= kFeatureReach; ++dx)
+                for (int h = 0; h < 2; ++h) {
+                    patchDistances(halves[1 - h], dx, dy, kFeatureFloor, scratch, distances.data());
+                    for (int row = std::max(y, -dy); row < std::min(bottom, height - dy); ++row) {
+                        const int begin = std::max(x, -dx), end = std::min(right, width - dx);
+                        if (begin >= end) continue;
+                        const int at = (row - y) * kTile + begin - x;
+                        const int there =
+                            (row - y + kTileMargin + dy) * kTileSide + begin - x + kTileMargin + dx;
+                        const float *values[3] = {}, *variances[3] = {};
+                        float *s[3] = {}, *q[3] = {};
+                        for (int c = 0; c < channels; ++c) {
+                            values[c] = halves[h].values(c) + there;
+                            variances[c] = halves[h].variances(c) + there;
+                            s[c] = sums[h].value(c) + at;
+                            q[c] = sums[h].variance(c) + at;
+                        }
+                        accumulate(distances.data() + at, end - begin, values, variances, channels,
+                                   weights.data(), sums[h].total() + at, s, q);
+                    }
                 }
+        for (int row = y; row < bottom; ++row)
+            for (int col = x; col < right; ++col) {
+                const int at = (row - y) * kTile + col - x;
+                const int here = (row - y + kTileMargin) * kTileSide + col - x + kTileMargin;
+                const bool alone = counts[static_cast<std::size_t>(here)] <= 1;
+                float product = 0, square = 0;
+                for (int c = 0; c < channels; ++c) {
+                    float value[2], error = 0, left[2];
+                    for (int h = 0; h < 2; ++h) {
+                        const float total = noisy ? sums[h].total()[at] : 1, own = halves[h].values(c)[here];
+                        value[h] = noisy ? sums[h].value(c)[at] / total : own;
+                        error +=
+                            noisy ? sums[h].variance(c)[at] / (total * total) : halves[h].variances(c)[here];
+                        left[h] = own - value[h];
+                    }
+                    features.row(planes.value(first + c), row)[col] = (value[0] + value[1]) / 2;
+                    features.row(planes.error(first + c), row)[col] = error / (alone ? 2 : 4);
+                    if (alone) continue;
+                    product += left[0] * left[1];
+                    square += (left[0] + left[1]) * (left[0] + left[1]) / 4;
+                }
+                residuals.row(residual.products(group), row)[col] = product;
+                residuals.row(residual.squares(group), row)[col] = square;
+            }
         first = last;
+    }
+}
+
+void returnResiduals(const RowRing& raw, const RowRing& residuals, const SampleLayout& layout, int y,
+                     int width, int height, RowRing& features) {
+    const FeaturePlanes planes{layout.features};
+    const ResidualPlanes residual{layout.groups};
+    const auto w = static_cast<std::size_t>(width);
+    std::vector<float> sums[3];  // down columns: of products, their squares, and squares
+    std::vector<float> shares(static_cast<std::size_t>(layout.groups) * w), around[3];
+    for (auto& a : around) a.resize(w);
+    for (int g = 0; g < layout.groups; ++g) {
+        for (auto& s : sums) s.assign(w, 0.f);
+        for (int row = std::max(0, y - kReturnReach); row <= std::min(height - 1, y + kReturnReach); ++row)
+            addResiduals(residuals.row(residual.products(g), row), residuals.row(residual.squares(g), row),
+                         windowWeight(row - y, kReturnReach), width, sums[0].data(), sums[1].data(),
+                         sums[2].data());
+        for (int k = 0; k < 3; ++k) sumAround(sums[k], kReturnReach, k == 1, around[k].data());
+        for (std::size_t i = 0; i < w; ++i) {
+            const float known = around[0][i] - kReturnSignificance * std::sqrt(around[1][i]);
+            shares[static_cast<std::size_t>(g) * w + i] =
+                known > 0 ? std::min(1.f, known / around[2][i]) : 0.f;
+        }
+    }
+    for (int f = 0; f < layout.features; ++f) {
+        const float* share =
+            shares.data() + static_cast<std::size_t>(layout.group[static_cast<std::size_t>(f)]) * w;
+        const float *value = raw.row(planes.value(f), y), *error = raw.row(planes.error(f), y);
+        float *to = features.row(planes.value(f), y), *toError = features.row(planes.error(f), y);
+        for (std::size_t i = 0; i < w; ++i) {
+            if (share[i] <= 0) continue;
+            to[i] += share[i] * (value[i] - to[i]);
+            const float from = std::sqrt(toError[i]);
+            const float deviation = from + share[i] * (std::sqrt(error[i]) - from);
+            toError[i] = deviation * deviation;
+        }
     }
 }
 

@@ -13,14 +13,27 @@ namespace vlx {
 inline constexpr float kAlikeFeatures2 = 0.01f;
 inline constexpr int kFeatureReach = 5;   ///< pixels around a pixel that its features are averaged over
 inline constexpr int kVarianceReach = 5;  ///< and its error variance
+inline constexpr int kReturnReach = 11;   ///< that tell what smoothing its features took away
 
-/// Prefilters the features (FeaturePlanes, as `features`) of the rows
-/// [y, y + kTile) at columns [x, x + kTile) (cut to the image): non-local means in each group, weights
-/// exp(-d) of patch_similarity.h. The error variance of what is written is sum w^2 v / (sum w)^2. A group
-/// without noise is copied. The error variance that steers the weights is averaged with that of the 3 x 3
-/// pixels around. Not `clean`: all are copied, with that error variance.
-void prefilterFeatures(const RowRing& raw, const SampleLayout& layout, bool clean, int x, int y, int width,
-                       int height, RowRing& features);
+/// Prefilters the features (FeaturePlanes, as `features`) of the rows [y, y + kTile) at columns
+/// [x, x + kTile) (cut to the image): non-local means in each group of each half f_h, with weights exp(-d),
+/// d the patch_similarity.h of the *other* half, so that they are independent of what they weigh:
+///     F_h = sum w f_h / sum w,    F = (F_A + F_B) / 2,    u = (U_A + U_B) / 4,
+///     U_h = sum w^2 u_h / (sum w)^2.
+/// The error variances u_h are averaged with those of the 3 x 3 pixels around. A pixel of one sample is
+/// the same in both: it steers its own weights, and u = (U_A + U_B) / 2. A group without
+/// noise is copied; not `clean`: all are. Writes ResidualPlanes too (0 of pixels of one sample).
+void prefilterFeatures(const RowRing& raw, const RowRing& data, const DataPlanes& dataPlanes,
+                       const SampleLayout& layout, bool clean, int x, int y, int width, int height,
+                       RowRing& features, RowRing& residuals);
+
+/// Gives back to the prefiltered features of row y what both halves show of what was taken off, r = f - F:
+///     F <- F + q (f - F),    q = (sum g r_A r_B - 3 sqrt(sum g^2 (r_A r_B)^2)) / sum g ((r_A + r_B) / 2)^2,
+/// 0 <= q <= 1, g of window_sum.h over the pixels within kReturnReach: the least squares of an image that
+/// both halves have in common, in whose product noise cancels, less three standard errors. Errors of
+/// f and F count as one; texture that is not given back is not in them.
+void returnResiduals(const RowRing& raw, const RowRing& residuals, const SampleLayout& layout, int y,
+                     int width, int height, RowRing& features);
 
 /// Variance of one sample of R, G, B for the pixels of row y: V = sum w S / F, F = sum w (n - 1), over the
 /// pixels within kVarianceReach, S their sums of squares and n their counts (SquaresPlanes),
