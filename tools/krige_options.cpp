@@ -13,7 +13,8 @@ namespace {
 const std::vector<OptionUse>& usesByMethod() {
     static const std::vector<OptionUse> uses = {
         {{"--quality", "--fireflies", "--strength", "--feature", "--radiance", "--scale", "--filter",
-          "--band", "--no-features", "--without", "--max-memory"},
+          "--band", "--no-features", "--without", "--max-memory", "--denoised", "--denoised-halves",
+          "--denoiser"},
          {"--method krige"}},
         {{"--clamp"}, {"--fireflies clamp"}},
         {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
@@ -140,6 +141,7 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
                    "Also write where more samples would lower the error most: an EXR image with channel "
                    "sampling.density, for vlx-trace --append --sample-map (not with --method gaussian)")
         ->option_text("IMAGE");
+    o.opinion.bind(app);
     app.add_flag("--no-features", o.noFeatures, "krige: use neither albedo nor N nor Z");
     addSteps(app, o.krige.steps);
     app.add_option("--sigma", o.gaussian.sigma, "gaussian: standard deviation in pixels")

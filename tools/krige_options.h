@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "import_options.h"
+#include "opinion/opinion_options.h"
 #include "variolux/dump/positions.h"
 #include "variolux/reconstruct/pixel_filter.h"
 #include "variolux/reconstruct/reconstruct.h"
@@ -27,6 +28,7 @@ struct KrigeOptions {
     PixelFilter filter = PixelFilter::Box;
     std::string band;
     std::string samplingMap;
+    OpinionOptions opinion;
     bool noFeatures = false;
     PositionConvention positions = PositionConvention::Raster;
     bool layersAreSamples = false;

@@ -104,6 +104,8 @@ void tell(const vlx::SampleSource& source, const std::string& original, const vl
 void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     std::vector<std::string> files = o.moments.files();
     files.insert(files.end(), {o.input, o.layersOf});
+    const std::vector<std::string> opinions = o.opinion.files();
+    files.insert(files.end(), opinions.begin(), opinions.end());
     vlx::checkOutputName(o.image, files);
     const std::string diagnosticsName = o.diagnostics ? o.image + ".json" : "";
     vlx::checkOutputs(
@@ -121,8 +123,11 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     if (!o.samplingMap.empty() && !o.samplingMap.ends_with(".exr"))
         throw CLI::ValidationError("--sampling-map",
                                    "expected a name that ends with .exr, found '" + o.samplingMap + "'");
-    const vlx::Fingerprint made = vlx::fingerprintOf(
-        *o.commandLine, {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"}, files);
+    const vlx::Fingerprint made =
+        vlx::fingerprintOf(*o.commandLine,
+                           {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth",
+                            "--denoised", "--denoised-halves"},
+                           files);
     const std::string inputs = write.attributes[vlx::kInputsAttribute] = made.text(o.krige.band);
     std::vector<std::string> outputs = {o.image};
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
@@ -149,7 +154,9 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
         original.empty() ? vlx::ChannelMap() : replacedLayers(o, original, *source);
     vlx::LayerCopy copied;
     vlx::ReconstructionReport report;
-    const vlx::Method method = vlx::methodOf(o);
+    vlx::KrigeOptions withOpinion = o;
+    withOpinion.krige.secondOpinion = o.opinion.read(o.input, flat, dump.header().data);
+    const vlx::Method method = vlx::methodOf(withOpinion);
     if (original.empty() && !o.diagnostics && o.filter == vlx::PixelFilter::Box && o.samplingMap.empty()) {
         const vlx::Image outline = vlx::outline(dump, method);
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
@@ -229,6 +236,7 @@ int run(vlx::KrigeOptions& o) {
         std::vector<std::string*> names = one.moments.fileNames();
         names.insert(names.end(), {&one.input, &one.image, &one.samplingMap, &one.layersOf});
         for (std::string* name : names) *name = vlx::frameName(*name, frame);
+        one.opinion = o.opinion.ofFrame(frame);
         kriged(one, progress);
     });
     return vlx::kDone;

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
-#include <set>
 
 #include "edit/band_rows.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
+#include "variolux/dump/half_samples.h"
 #include "variolux/dump/reader.h"
 
 namespace vlx {
@@ -66,17 +66,6 @@ class PfmFile {
     std::streamoff begin_ = 0;
     int width_, height_;
 };
-
-bool hasReplicates(const DumpReader& reader) {
-    if (findChannel(reader.header(), kReplicateChannel) < 0) return false;
-    std::set<std::uint32_t> found;
-    const Window& w = reader.header().data;
-    for (int y = w.y; y < w.y + w.height && found.size() < 2; y += kBandRows) {
-        const SampleBand band = reader.read(y, std::min(kBandRows, w.y + w.height - y), {kReplicateChannel});
-        for (const float v : band.values[0]) found.insert(replicateNumber(v).value());
-    }
-    return found.size() > 1;
-}
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 
 #include "reconstruct/common/bands.h"
 #include "reconstruct/common/methods.h"
+#include "reconstruct/opinion/opinion.h"
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
 
@@ -72,7 +73,10 @@ ReconstructionReport reconstruct(const SampleSource& source, const Method& metho
         const SampleSource& source;
         const RowSink& sink;
         const Progress& progress;
-        auto operator()(const Drift& m) const { return reconstructDrift(source, m, sink, progress); }
+        auto operator()(const Drift& m) const {
+            return m.secondOpinion ? reconstructWithOpinion(source, m, sink, progress)
+                                   : reconstructDrift(source, m, sink, progress);
+        }
         auto operator()(const Paper& m) const { return reconstructPaper(source, m, sink, progress); }
         auto operator()(const Mean& m) const { return reconstructMean(source, m, sink, progress); }
         auto operator()(const Gaussian& m) const { return reconstructGaussian(source, m, sink, progress); }

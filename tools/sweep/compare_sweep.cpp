@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "sweep/child_process.h"
+#include "process/child_process.h"
 #include "sweep/sweep.h"
 #include "sweep/sweep_page.h"
 #include "sweep/sweep_summary.h"

@@ -7,7 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "sweep/child_process.h"
+#include "process/child_process.h"
 #include "sweep/machine.h"
 #include "sweep/sweep_command.h"
 #include "sweep/sweep_images.h"

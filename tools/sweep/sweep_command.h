@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "sweep/child_process.h"
+#include "process/child_process.h"
 
 /// The texts of a sweep's commands, and what they print.
 namespace vlx {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "sweep/child_process.h"
+#include "process/child_process.h"
 #include "sweep/sweep_command.h"
 #include "variolux/base/error.h"
 #include "variolux/base/fingerprint.h"

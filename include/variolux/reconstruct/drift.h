@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "variolux/base/window.h"
+#include "variolux/reconstruct/second_opinion.h"
 
 /// The default method: kriging with external drift in overlapping neighbourhoods, several models, chosen
 /// between by halves of the samples.
@@ -15,10 +17,10 @@
 ///    samples; it is noisy and correlated with the mean, so that of one sample is averaged over pixels with
 ///    alike features (radius 5, joint bilateral on the features with their own error variances).
 /// 2. *Drift*: the constant, image coordinates to second order, and the features (albedo, normal, depth, and
-///    named ones), which are prefiltered where they are noisy (patch similarity with their error variances).
-///    Its coefficients are random with variances estimated in each neighbourhood (geostat/random_drift.h):
-///    the covariance of the field is that of finite rank, and a group of functions that explains nothing
-///    costs nothing.
+///    named ones), which are prefiltered where they are noisy: each half's by the other's patches
+///    (drift/prefilter.h). Its coefficients are random with variances estimated in each neighbourhood
+///    (geostat/random_drift.h): the covariance of the field is that of finite rank, and a group of functions
+///    that explains nothing costs nothing.
 /// 3. *Neighbourhood*: pixels around a centre, every few pixels. A datum's error variance grows with its
 ///    composite distance from the centre: v / w, w = exp(-d / k^2), where d compares the colour patches (7 x
 ///    7 pixels) of the *other* half with their known noise, so that weights are independent of what they
@@ -48,7 +50,7 @@
 ///    functions), less what they spread about their mean, which averaging takes off. That spread is added, as
 ///    what the drift does not say, and so is what a model differs from the combination by beyond its own
 ///    variance; half the resolution mixes its own in by w, where that is less, and adds w (1 - w) (L - K)^2.
-///    Errors u of the features make 2 sum b^2 u of it. What the halves have wrong alike their difference does
+///    Errors u of the features make sum b^2 u of it. What the halves have wrong alike their difference does
 ///    not show: the product of their residuals does, (z_A - A)(z_B - B), in which noise cancels; what it has
 ///    more than all this, pooled over 33 rows by 33 and 513 columns, is added (drift/common_error.h). Lost
 ///    light is known to as many samples as lost it: y^2 times sum r^2 / (sum y)^2. A pixel's own scatter
@@ -124,6 +126,11 @@ struct Drift {
     int scale = 1;  ///< 1 to 4: pixels of the image along each axis for one of the dump
     DriftSteps steps = {};
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
+
+    /// What another denoiser made of the same samples, to be combined with the estimate (second_opinion.h;
+    /// METHOD.md 7.11): R, G, B and their error. Not with a scale above 1, nor with `radiance`, whose parts
+    /// would not add up.
+    std::shared_ptr<const SecondOpinion> secondOpinion = {};
 
     /// Bytes that the process may take, at most (resident memory, as the kernel counts it); 0: any number.
     /// Fewer rows of the dump are then read at a time.

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -10,6 +11,7 @@
 
 #include "variolux/base/image.h"
 #include "variolux/reconstruct/inspection.h"
+#include "variolux/reconstruct/second_opinion.h"
 
 namespace vlx {
 
@@ -88,8 +90,9 @@ struct DriftReport {
     std::int64_t driftFeatures = 0;         ///< sum over neighbourhoods of the features that vary there; the
                                             ///< others are no drift
     double driftFunctions = 0;              ///< sum over neighbourhoods of the effective number of functions
-    std::map<std::string, double> seconds;  ///< wall time by stage
-    std::vector<ResidualRegion> residuals;  ///< row by row; where asked for (Drift::diagnostics)
+    std::optional<SecondOpinionReport> secondOpinion;  ///< where there was one
+    std::map<std::string, double> seconds;             ///< wall time by stage
+    std::vector<ResidualRegion> residuals;             ///< row by row; where asked for (Drift::diagnostics)
     std::map<std::size_t, RegionInspection> inspections;  ///< of residuals (by index) where it was asked for
 };
 

@@ -27,19 +27,26 @@ nlohmann::ordered_json json(const PaperReport& report) {
 }
 
 nlohmann::ordered_json json(const DriftReport& report) {
-    return {{"limitedSamples", report.limitedSamples},
-            {"energyRemoved", report.energyRemoved},
-            {"energyReturned", report.energyReturned},
-            {"light", report.light},
-            {"lightError", report.lightError},
-            {"farPixels", report.farPixels},
-            {"exactPixels", report.exactPixels},
-            {"neighbourhoods", report.neighbourhoods},
-            {"ownNeighbourhoods", report.ownNeighbourhoods},
-            {"failedNeighbourhoods", report.failedNeighbourhoods},
-            {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
-            {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
-            {"seconds", report.seconds}};
+    nlohmann::ordered_json document = {
+        {"limitedSamples", report.limitedSamples},
+        {"energyRemoved", report.energyRemoved},
+        {"energyReturned", report.energyReturned},
+        {"light", report.light},
+        {"lightError", report.lightError},
+        {"farPixels", report.farPixels},
+        {"exactPixels", report.exactPixels},
+        {"neighbourhoods", report.neighbourhoods},
+        {"ownNeighbourhoods", report.ownNeighbourhoods},
+        {"failedNeighbourhoods", report.failedNeighbourhoods},
+        {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
+        {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
+        {"seconds", report.seconds}};
+    if (const auto& of = report.secondOpinion)
+        document["secondOpinion"] = {{"validated", of->validated},
+                                     {"weight", of->weight},
+                                     {"yielded", of->yielded},
+                                     {"limited", of->limited}};
+    return document;
 }
 
 nlohmann::ordered_json json(std::monostate) { return nlohmann::ordered_json::object(); }
@@ -173,6 +180,13 @@ std::string inWords(const DriftReport& report) {
          << report.neighbourhoods << " neighbourhoods kriged, "
          << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
+    if (const auto& of = report.secondOpinion)
+        text << "the kriging weighs " << 100 * of->weight << " %, the other image the rest ("
+             << (of->validated ? "validated on samples that neither had seen"
+                               : "equal weights but for what is certain: --denoised-halves would tell")
+             << "); in " << 100 * of->yielded << " % of the pixels samples speak against the other image, in "
+             << 100 * of->limited << " % its pull is limited to " << kOpinionDeviations
+             << " standard deviations\n";
     if (!report.residuals.empty())
         text << std::ranges::count_if(report.residuals, [](const ResidualRegion& r) { return r.structure; })
              << " of " << report.residuals.size()

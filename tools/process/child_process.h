@@ -2,12 +2,13 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace vlx {
 
 /// What a command did and what it cost.
 struct ProcessRun {
-    int exitCode = 0;          ///< -signal when a signal ended it; 127: the shell did not find the program
+    int exitCode = 0;          ///< -signal when a signal ended it; 127: the program was not found
     double seconds = 0;        ///< wall time from start to end
     double userSeconds = 0;    ///< processor time of it and all processes that it waited for
     double systemSeconds = 0;  ///< likewise, in the kernel
@@ -20,13 +21,17 @@ struct ProcessRun {
     double cpuSeconds() const { return userSeconds + systemSeconds; }
 };
 
-/// Runs `command` with /bin/sh -c in the present folder, without standard input, and waits for its end. Times
+/// Runs the program words[0], found in PATH, with the other words as its arguments, in the present folder,
+/// without standard input, and waits for its end. Times
 /// and memory are the kernel's own account (wait4). The command is a process group of its own; it gets
 /// SIGTERM if this process dies. Throws Error when no process can be started, and when the output exceeds 64
 /// MiB.
+ProcessRun runProgram(const std::vector<std::string>& words);
+
+/// The same of a text for /bin/sh -c.
 ProcessRun runCommand(const std::string& command);
 
-/// Sends SIGTERM to the command that runCommand() waits for, if there is one, and all that it started. For a
+/// Sends SIGTERM to the command that is waited for, if there is one, and all that it started. For a
 /// program's signal handler: async-signal-safe.
 void endRunningCommand() noexcept;
 

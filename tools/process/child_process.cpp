@@ -1,4 +1,4 @@
-#include "sweep/child_process.h"
+#include "process/child_process.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -87,7 +87,10 @@ double secondsOf(const timeval& time) {
 
 }  // namespace
 
-ProcessRun runCommand(const std::string& command) {
+ProcessRun runProgram(const std::vector<std::string>& words) {
+    std::vector<char*> arguments;
+    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+    arguments.push_back(nullptr);
     Pipe out, err;
     const Descriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
     const pid_t parent = ::getpid();
@@ -102,7 +105,7 @@ ProcessRun runCommand(const std::string& command) {
         ::dup2(out.writeEnd.get(), 1);
         ::dup2(err.writeEnd.get(), 2);
         ::signal(SIGXFSZ, SIG_DFL);
-        ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+        ::execvp(arguments[0], arguments.data());
         ::_exit(127);
     }
     ::setpgid(child, child);  // here too: whoever comes first
@@ -120,13 +123,15 @@ ProcessRun runCommand(const std::string& command) {
             throw Error("", std::string("cannot wait for a process: ") + std::strerror(errno));
     runningGroup = 0;
     run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (!complete) throw Error(command, "expected at most 64 MiB of output");
+    if (!complete) throw Error(words.back(), "expected at most 64 MiB of output");
     run.exitCode = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
     run.userSeconds = secondsOf(usage.ru_utime);
     run.systemSeconds = secondsOf(usage.ru_stime);
     run.peakBytes = std::int64_t{usage.ru_maxrss} * 1024;
     return run;
 }
+
+ProcessRun runCommand(const std::string& command) { return runProgram({"/bin/sh", "-c", command}); }
 
 void endRunningCommand() noexcept {
     if (const pid_t group = runningGroup) ::kill(-group, SIGTERM);

@@ -1,0 +1,273 @@
+#include "reconstruct/opinion/opinion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "reconstruct/common/window_sum.h"
+#include "reconstruct/opinion/evidence.h"
+#include "variolux/base/error.h"
+#include "variolux/base/memory.h"
+#include "variolux/dump/half_samples.h"
+
+namespace vlx {
+
+namespace {
+
+constexpr double kEqualWeights = 0.5;
+constexpr double kPriorData = 10;        // that speak for equal weights
+constexpr double kRelativeError = 1e-3;  // of a value squared: dark pixels are not all that counts
+constexpr double kTrimmed = 0.02;        // of the pixels
+constexpr int kJudgedRows = 128;         // of a band at least: margins cost as much again
+constexpr int kApartReach = 4;           // pixels along a row
+
+/// Every third band of rows, or the whole of a small picture: what the weight is found in. A third of the
+/// rows tells it as well as all.
+std::vector<Band> judgedBands(int height) {
+    const int thirds = height / (3 * kJudgedRows);
+    if (thirds == 0) return {{}};
+    std::vector<Band> bands;
+    for (int i = 0; i < thirds; ++i) bands.push_back({3 * i + 1, 3 * thirds});
+    return bands;
+}
+
+/// Rows of progress so far, and of all.
+struct Steps {
+    const Progress& progress;
+    std::int64_t before = 0, all = 0;
+    Progress next() const {
+        if (!progress) return {};
+        return [this](std::int64_t done, std::int64_t) { progress(before + done, all); };
+    }
+};
+
+/// A draft of some rows of the picture, row by row; channels are R, G, B first and stddev.R, .G, .B last.
+template <class F>
+void forDraftRows(const SampleSource& source, const Drift& options, const Band& band, Steps& steps, F row) {
+    Drift draft = options;
+    draft.quality = Quality::Draft;
+    draft.secondOpinion = nullptr;
+    draft.strength = 1;
+    draft.diagnostics = false;
+    draft.inspect.clear();
+    draft.band = band;
+    const Image outline = driftOutline(source, draft);
+    int y = outline.data.y - source.header().data.y;
+    const std::ptrdiff_t stride = std::ptrdiff_t{outline.data.width} * outline.channelCount();
+    reconstructDrift(
+        source, draft,
+        [&](const float* rows, int count) {
+            for (int i = 0; i < count; ++i, ++y) row(y, rows + i * stride, outline.channelCount());
+        },
+        steps.next());
+    steps.before += outline.data.height;
+}
+
+double relativeUnit(const SampleMeans& samples, std::size_t pixel, const float* kriged) {
+    double variance = 1e-30, square = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        variance += static_cast<double>(samples.variance[c][pixel]) / 3;
+        square += static_cast<double>(kriged[c]) * static_cast<double>(kriged[c]) / 3;
+    }
+    return 1 / (variance + kRelativeError * square);
+}
+
+/// The weight w of the kriging K, of halves, in K w + D (1 - w) that predicts the other half's means z best:
+///     w = (sum u (z - D) (K - D) + l / 2) / (sum u (K - D)^2 + l),   u = 1 / (v + 1e-3 K^2).
+/// Nothing where no pixel has samples of both halves.
+std::optional<double> validatedWeight(const SampleSource& source, const Drift& options, Steps& steps) {
+    const bool replicates = hasReplicates(source);
+    double product = 0, square = 0;
+    std::int64_t judged = 0;
+    const HalfSamples samples[] = {{source, replicates, 0}, {source, replicates, 1}};
+    const SampleMeans ofHalf[] = {sampleMeans(samples[0]), sampleMeans(samples[1])};
+    for (int half = 0; half < 2; ++half) {
+        const SampleMeans& means = ofHalf[1 - half];
+        const Image& denoised = (*options.secondOpinion->halves)[static_cast<std::size_t>(half)];
+        for (const Band& band : judgedBands(source.header().data.height))
+            forDraftRows(samples[half], options, band, steps, [&](int y, const float* row, int channels) {
+                for (int x = 0; x < means.width; ++x) {
+                    const std::size_t p = means.at(x, y);
+                    if (!ofHalf[0].known(p) || !ofHalf[1].known(p)) continue;
+                    ++judged;
+                    const float *k = row + std::ptrdiff_t{x} * channels, *d = denoised.at(x, y);
+                    const double u = relativeUnit(means, p, k);
+                    for (std::size_t c = 0; c < 3; ++c) {
+                        const double apart = static_cast<double>(k[c] - d[c]);
+                        product += u * static_cast<double>(means.mean[c][p] - d[c]) * apart;
+                        square += u * apart * apart;
+                    }
+                }
+            });
+    }
+    if (judged == 0) return std::nullopt;
+    return std::clamp((product + kPriorData * kEqualWeights) / (square + kPriorData), 0.0, 1.0);
+}
+
+/// Without halves nothing is honest but what is certain: equal weights, or, where the other image's certain
+/// errors e outweigh a draft's predicted ones s^2 over the picture, sum u e / (sum u e + sum u s^2), without
+/// the pixels of the largest u e: places tell of themselves only, and only many of them of the image.
+double certainWeight(const SampleSource& source, const Drift& options, const SampleMeans& samples,
+                     const std::vector<float>& certain, Steps& steps) {
+    std::vector<double> wrong;
+    double predicted = 0;
+    for (const Band& band : judgedBands(source.header().data.height))
+        forDraftRows(source, options, band, steps, [&](int y, const float* row, int channels) {
+            for (int x = 0; x < samples.width; ++x) {
+                const std::size_t p = samples.at(x, y);
+                const float *k = row + std::ptrdiff_t{x} * channels, *s = k + channels - 3;
+                const double u = relativeUnit(samples, p, k);
+                wrong.push_back(u * static_cast<double>(certain[p]));
+                for (int c = 0; c < 3; ++c)
+                    predicted += u * static_cast<double>(s[c]) * static_cast<double>(s[c]) / 3;
+            }
+        });
+    std::sort(wrong.begin(), wrong.end());
+    wrong.resize(wrong.size() - static_cast<std::size_t>(kTrimmed * static_cast<double>(wrong.size())));
+    const double sum = std::accumulate(wrong.begin(), wrong.end(), 0.0);
+    return std::max(kEqualWeights, sum > 0 ? sum / (sum + predicted) : 0);
+}
+
+/// Combines finished rows with the other image.
+class Combiner {
+  public:
+    Combiner(const Image& denoised, const std::vector<float>& certain, double weight, bool validated,
+             int width, int channels, int firstRow)
+        : denoised_(denoised),
+          certain_(certain),
+          weight_(weight),
+          validated_(validated),
+          width_(width),
+          channels_(channels),
+          y_(firstRow) {}
+
+    void combineRow(float* row) {
+        const auto w = static_cast<std::size_t>(width_);
+        std::vector<float> apart2[3], around(w), pixels(w, 1.f), count(w);
+        sumAround(pixels, kApartReach, false, count.data());
+        for (int c = 0; c < 3; ++c) {
+            apart2[c].resize(w);
+            for (int x = 0; x < width_; ++x) {
+                const float d = denoised_.at(x, y_)[c] - row[x * channels_ + c];
+                apart2[c][static_cast<std::size_t>(x)] = d * d;
+            }
+            sumAround(apart2[c], kApartReach, false, around.data());
+            for (std::size_t i = 0; i < w; ++i) apart2[c][i] = around[i] / count[i];
+        }
+        for (int x = 0; x < width_; ++x) {
+            const auto i = static_cast<std::size_t>(x);
+            float *const k = row + std::ptrdiff_t{x} * channels_, *const s = k + channels_ - 3;
+            const double wrong = certain_[static_cast<std::size_t>(y_) * w + i];
+            double own = 0;
+            for (int c = 0; c < 3; ++c) own += static_cast<double>(s[c]) * static_cast<double>(s[c]) / 3;
+            const double weight = std::max(weight_, wrong > 0 ? wrong / (wrong + own) : 0);
+            yielded_ += weight > weight_;
+            bool limited = false;
+            for (int c = 0; c < 3; ++c) {
+                const double deviation = s[c], apart = static_cast<double>(denoised_.at(x, y_)[c] - k[c]);
+                const double most = kOpinionDeviations * deviation, full = (1 - weight) * apart;
+                const double move = std::clamp(full, -most, most);
+                limited = limited || move != full;
+                // A validated q is the least squares': what is left is s^2 - q^2 (D - K)^2. Of two estimates
+                // that err by s^2 each it is s^2 - q (1 - q) (D - K)^2. Farther apart, one of them is wrong.
+                const double q = apart != 0 ? move / apart : 0, known = validated_ ? q * q : q * (1 - q);
+                const double variance =
+                    std::max({deviation * deviation - known * static_cast<double>(apart2[c][i]),
+                              move * (apart - move), deviation * deviation / 4});
+                k[c] += static_cast<float>(move);
+                s[c] = static_cast<float>(std::sqrt(variance));
+            }
+            limited_ += limited;
+        }
+        ++y_;
+        rows_ += 1;
+    }
+
+    void report(SecondOpinionReport& of) const {
+        const double pixels = static_cast<double>(rows_) * width_;
+        of.weight = weight_;
+        of.yielded = static_cast<double>(yielded_) / pixels;
+        of.limited = static_cast<double>(limited_) / pixels;
+    }
+
+  private:
+    const Image& denoised_;
+    const std::vector<float>& certain_;
+    double weight_;
+    bool validated_;
+    int width_, channels_, y_;
+    std::int64_t rows_ = 0, yielded_ = 0, limited_ = 0;
+};
+
+}  // namespace
+
+Image checkedOpinion(Image image, const std::string& name, const Window& window) {
+    for (const char* channel : {"R", "G", "B"})
+        if (image.channel(channel) < 0)
+            throw Error(name,
+                        "expected channels R, G and B of another denoiser, found others: FILE:LAYER "
+                        "names a layer");
+    const bool placed = image.data.x != 0 || image.data.y != 0;
+    if (image.data.width != window.width || image.data.height != window.height ||
+        (placed && (image.data.x != window.x || image.data.y != window.y)))
+        throw Error(name, "expected the samples' window, " + windowText(window) + ", found " +
+                              windowText(image.data));
+    Image result = image.select({"R", "G", "B"});
+    result.data = window;
+    for (std::size_t p = 0; p < result.pixels.size(); ++p)
+        if (!std::isfinite(result.pixels[p])) {
+            const auto pixel = static_cast<std::int64_t>(p / 3);
+            throw Error(name, "expected finite values, found " + std::to_string(result.pixels[p]) +
+                                  " at column " + std::to_string(window.x + pixel % window.width) + ", row " +
+                                  std::to_string(window.y + pixel / window.width));
+        }
+    return result;
+}
+
+ReconstructionReport reconstructWithOpinion(const SampleSource& source, const Drift& options,
+                                            const RowSink& sink, const Progress& progress) {
+    const SecondOpinion& opinion = *options.secondOpinion;
+    const Window& picture = source.header().data;
+    const Image outline = driftOutline(source, options);
+    for (const Image* image : {&opinion.image, opinion.halves ? &(*opinion.halves)[0] : nullptr,
+                               opinion.halves ? &(*opinion.halves)[1] : nullptr})
+        if (image && (image->data != picture || image->channelCount() != 3))
+            throw Error(source.path(),
+                        "expected another denoiser's image of R, G, B over the samples' window");
+    const std::uint64_t planes = 6 + 6 + 3 + 4 + 1;  // means twice, the image, evidence
+    requireMemory(source.path(), imageBytes(picture, planes), "another denoiser's image beside the means");
+
+    Steps steps{progress, 0, outline.data.height};
+    for (const Band& band : judgedBands(picture.height))
+        steps.all += (opinion.halves ? 2 : 1) * picture.height / std::max(1, band.count);
+    SecondOpinionReport report;
+    std::vector<float> certain;
+    {
+        const SampleMeans samples = sampleMeans(source);
+        certain = certainError(samples, opinion.image);
+        std::optional<double> weight;
+        if (opinion.halves) weight = validatedWeight(source, options, steps);
+        report.validated = weight.has_value();
+        report.weight = weight ? *weight : certainWeight(source, options, samples, certain, steps);
+    }
+    Combiner combiner(opinion.image, certain, report.weight, report.validated, picture.width,
+                      outline.channelCount(), outline.data.y - picture.y);
+    std::vector<float> rows;
+    Drift alone = options;
+    alone.secondOpinion = nullptr;
+    const std::ptrdiff_t stride = std::ptrdiff_t{picture.width} * outline.channelCount();
+    ReconstructionReport result = reconstructDrift(
+        source, alone,
+        [&](const float* kriged, int count) {
+            rows.assign(kriged, kriged + count * stride);
+            for (int row = 0; row < count; ++row) combiner.combineRow(rows.data() + row * stride);
+            sink(rows.data(), count);
+        },
+        steps.next());
+    combiner.report(report);
+    std::get<DriftReport>(result.method).secondOpinion = report;
+    return result;
+}
+
+}  // namespace vlx

@@ -1,0 +1,126 @@
+// Another denoiser's image for vlx-krige, given and made.
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "run_tool.h"
+#include "temporary_folder.h"
+#include "variolux/base/image_io.h"
+
+namespace vlx {
+namespace {
+
+const std::string kSamples = VLX_TESTDATA "/dumps/tungsten_cornell.exr";
+
+struct KrigeOpinion : testing::Test {
+    ToolRun krige(std::vector<std::string> more) {
+        more.insert(more.begin(), {kSamples, "-o", out, "--json", "--overwrite"});
+        return runTool("vlx-krige", more);
+    }
+    nlohmann::json reportOf(const ToolRun& run) {
+        EXPECT_EQ(run.exitCode, 0) << run.err;
+        return run.exitCode == 0 ? nlohmann::json::parse(run.out)["secondOpinion"] : nlohmann::json();
+    }
+    /// A program in `folder`, first in PATH.
+    void program(const std::string& name, const std::string& text) {
+        std::ofstream(folder / name) << "#!/bin/sh\n" << text << "\n";
+        ::chmod((folder / name).c_str(), 0755);
+    }
+    TemporaryFolder folder;
+    std::string out = folder / "out.exr";
+};
+
+TEST_F(KrigeOpinion, ImagesAndHalvesOfAnyFormat) {
+    ASSERT_EQ(runTool("vlx-pack", {"halves", kSamples, "-o", folder / "h"}).exitCode, 0);
+    const auto report = reportOf(krige({"--denoised", folder / "h_color.pfm", "--denoised-halves",
+                                        folder / "h_even_color.pfm" + "," + (folder / "h_odd_color.pfm")}));
+    EXPECT_TRUE(report["validated"].get<bool>());
+    EXPECT_GT(report["weight"].get<double>(), 0.8);  // the samples' own mean is no denoiser
+    // What the kriging made, a layer of a file, is a good one.
+    const Image kriged = readImage(out);
+    Image layers = kriged.select({"R", "G", "B"});
+    layers.channels = {"View.Denoised.R", "View.Denoised.G", "View.Denoised.B"};
+    writeImage(folder / "layers.exr", layers);
+    const auto alone = reportOf(krige({"--denoised", (folder / "layers.exr") + ":View.Denoised"}));
+    EXPECT_FALSE(alone["validated"].get<bool>());
+    EXPECT_EQ(alone["weight"].get<double>(), 0.5);
+}
+
+TEST_F(KrigeOpinion, WrongImagesAreErrors) {
+    ASSERT_EQ(krige({}).exitCode, 0);
+    const Image rgb = readImage(out).select({"R", "G", "B"});
+    writeImage(folder / "rgb.exr", rgb);
+    const auto expectError = [&](const Image& image, const std::string& text) {
+        writeImage(folder / "wrong.exr", image);
+        const ToolRun run = krige({"--denoised", folder / "wrong.exr"});
+        EXPECT_EQ(run.exitCode, 1) << text;
+        EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
+    };
+    Image moved = rgb;
+    moved.data.x += 1;
+    moved.display.x += 1;
+    expectError(moved, "window");
+    Image infinite = rgb;
+    infinite.pixels[4] = std::numeric_limits<float>::infinity();
+    expectError(infinite, "finite values, found inf");
+    EXPECT_EQ(krige({"--denoised", folder / "none.exr"}).exitCode, 1);
+    EXPECT_EQ(krige({"--denoised", (folder / "wrong.exr") + ":Layer"}).exitCode, 1);
+    EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--denoised-halves", "one.exr"}).exitCode, 2);
+    EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--scale", "2"}).exitCode, 1);
+    EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--method", "paper"}).exitCode, 2);
+}
+
+TEST_F(KrigeOpinion, ADenoiserIsRunOnAllThree) {
+    program("copy it", "echo \"$1\" >> '" + (folder / "calls") + "'; cp \"$1\" \"$2\"");
+    const auto report = reportOf(krige({"--denoiser", "'" + (folder / "copy it") + "' {color} {output}"}));
+    EXPECT_TRUE(report["validated"].get<bool>());
+    std::ifstream calls(folder / "calls");
+    int count = 0;
+    for (std::string line; std::getline(calls, line); ++count)
+        EXPECT_FALSE(std::filesystem::exists(line)) << "the temporary folder is gone";
+    EXPECT_EQ(count, 3);
+}
+
+TEST_F(KrigeOpinion, WhatADenoiserDoesWrongIsTold) {
+    program("fails", "echo 'no licence' >&2; exit 3");
+    const ToolRun failed = krige({"--denoiser", folder / "fails"});
+    EXPECT_EQ(failed.exitCode, 1);
+    EXPECT_NE(failed.err.find("failed with exit code 3: no licence"), std::string::npos) << failed.err;
+    const ToolRun missing = krige({"--denoiser", "no-such-denoiser {color}"});
+    EXPECT_EQ(missing.exitCode, 1);
+    EXPECT_NE(missing.err.find("was not found in PATH"), std::string::npos) << missing.err;
+    const ToolRun silent = krige({"--denoiser", "true {color} {output}"});
+    EXPECT_EQ(silent.exitCode, 1);
+    EXPECT_NE(silent.err.find("found no such file"), std::string::npos) << silent.err;
+    const ToolRun open = krige({"--denoiser", "cp '{color} {output}"});
+    EXPECT_EQ(open.exitCode, 1);
+    EXPECT_NE(open.err.find("closing '"), std::string::npos) << open.err;
+    EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST_F(KrigeOpinion, OidnGetsCleanFeatures) {
+    // A stand-in that checks its arguments: features first, then the image with them.
+    program("oidnDenoise", "echo \"$1 $3 $5 $7 $8\" >> '" + (folder / "calls") +
+                               "'\nfor last; do :; done\n[ -f \"$2\" ] || exit 4\ncp \"$2\" \"$last\"");
+    const std::string path = std::getenv("PATH");
+    ::setenv("PATH", (folder / "." + ":" + path).c_str(), 1);
+    const auto report = reportOf(krige({"--denoiser", "oidn"}));
+    ::setenv("PATH", path.c_str(), 1);
+    EXPECT_TRUE(report["validated"].get<bool>());
+    std::ifstream calls(folder / "calls");
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(calls, line);) lines.push_back(line);
+    ASSERT_EQ(lines.size(), 9U);
+    EXPECT_EQ(lines[0], "--alb -o   ");
+    EXPECT_EQ(lines[1], "--nrm -o   ");
+    EXPECT_EQ(lines[2], "--hdr --alb --nrm --clean_aux -o");
+}
+
+}  // namespace
+}  // namespace vlx

@@ -1,0 +1,217 @@
+// Another denoiser's image as secondary variable: what it is worth where it is right, and what a wrong one
+// costs.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "reconstruct/opinion/evidence.h"
+#include "variolux/base/error.h"
+#include "variolux/dump/half_samples.h"
+#include "variolux/dump/sample_buffer.h"
+#include "variolux/reconstruct/reconstruct.h"
+
+namespace vlx {
+namespace {
+
+const Window kPicture{-3, 5, 96, 80};
+constexpr double kSampleNoise = 0.4;  // of a sample, relative
+
+double truthAt(int x, int y) {
+    const double shade = 1 + 0.4 * std::sin(0.15 * x) * std::cos(0.1 * y);
+    return shade * ((x / 12 + y / 12) % 2 ? 0.3 : 1);
+}
+
+/// `count(x, y)` samples a pixel.
+SampleBuffer samplesOf(const std::function<int(int, int)>& count) {
+    std::mt19937_64 random(11);
+    std::normal_distribution<double> normal(1, kSampleNoise);
+    DumpHeader header;
+    header.data = header.display = kPicture;
+    header.channels = {{"R"}, {"G"}, {"B"}};
+    SampleBand band{kPicture.x, kPicture.y, kPicture.width, kPicture.height, {0}, {"R", "G", "B"}, {}};
+    band.values.resize(3);
+    for (int y = 0; y < kPicture.height; ++y)
+        for (int x = 0; x < kPicture.width; ++x) {
+            for (int i = 0; i < count(x, y); ++i)
+                for (auto& values : band.values)
+                    values.push_back(static_cast<float>(truthAt(x, y) * normal(random)));
+            band.offsets.push_back(band.values[0].size());
+        }
+    return {header, std::move(band)};
+}
+
+/// The truth with noise of the seed; `of` makes a wrong image of it.
+Image opinionOf(unsigned seed, const std::function<double(int, int)>& of = truthAt) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal(0, 0.03);
+    Image image(kPicture, {"R", "G", "B"});
+    for (int y = 0; y < kPicture.height; ++y)
+        for (int x = 0; x < kPicture.width; ++x)
+            for (int c = 0; c < 3; ++c) image.at(x, y)[c] = static_cast<float>(of(x, y) + normal(random));
+    return image;
+}
+
+Drift with(const std::function<double(int, int)>& of, bool halves) {
+    SecondOpinion opinion{opinionOf(1, of), {}};
+    if (halves) opinion.halves = {opinionOf(2, of), opinionOf(3, of)};
+    return {.secondOpinion = std::make_shared<SecondOpinion>(std::move(opinion))};
+}
+
+struct Errors {
+    double actual = 0, predicted = 0;
+};
+
+Errors errorsOf(const Image& image) {
+    Errors mean;
+    const double values = 3.0 * kPicture.width * kPicture.height;
+    for (int y = 0; y < kPicture.height; ++y)
+        for (int x = 0; x < kPicture.width; ++x)
+            for (int c = 0; c < 3; ++c) {
+                const double d = static_cast<double>(image.at(x, y)[c]) - truthAt(x, y),
+                             s = static_cast<double>(image.at(x, y)[3 + c]);
+                mean.actual += d * d / values;
+                mean.predicted += s * s / values;
+            }
+    return mean;
+}
+
+int eight(int, int) { return 8; }
+
+TEST(SecondOpinion, ARightOneHelpsAndTheErrorMapKnows) {
+    const SampleBuffer samples = samplesOf(eight);
+    const Errors kriged = errorsOf(reconstruct(samples, Drift{}).image);
+    for (const bool halves : {true, false}) {
+        const Reconstruction result = reconstruct(samples, with(truthAt, halves));
+        const SecondOpinionReport report = result.report.drift().secondOpinion.value();
+        const Errors errors = errorsOf(result.image);
+        EXPECT_LT(errors.actual, (halves ? 0.6 : 0.7) * kriged.actual) << halves;
+        const double ratio = errors.predicted / errors.actual;
+        EXPECT_GT(ratio, 0.5) << halves;
+        EXPECT_LT(ratio, 4) << halves;  // of an image four times better than the kriging the map is cautious
+        EXPECT_EQ(report.validated, halves);
+        if (halves)
+            EXPECT_LT(report.weight, 0.4);
+        else
+            EXPECT_EQ(report.weight, 0.5);
+        EXPECT_LT(report.yielded, 0.02) << halves;
+    }
+}
+
+TEST(SecondOpinion, AWrongOneCostsNextToNothing) {
+    const SampleBuffer samples = samplesOf(eight);
+    const double alone = errorsOf(reconstruct(samples, Drift{}).image).actual;
+    const std::pair<const char*, std::function<double(int, int)>> wrong[] = {
+        {"black", [](int, int) { return 0.0; }},
+        {"too bright", [](int x, int y) { return 1.1 * truthAt(x, y); }},
+        {"shifted", [](int x, int y) { return truthAt(x + 2, y); }},
+        {"another scene", [](int x, int y) { return 2 + std::sin(0.3 * (x + y)); }}};
+    for (const auto& [name, of] : wrong)
+        for (const bool halves : {true, false}) {
+            const Reconstruction result = reconstruct(samples, with(of, halves));
+            EXPECT_LT(errorsOf(result.image).actual, 1.1 * alone) << name << " " << halves;
+            // Too bright by a tenth, it errs little more than the kriging.
+            EXPECT_GT(result.report.drift().secondOpinion->weight,
+                      name == std::string("too bright") ? 0.4 : 0.8)
+                << name << " " << halves;
+        }
+}
+
+TEST(SecondOpinion, BandsAreTheWholeImage) {
+    const SampleBuffer samples = samplesOf([](int x, int y) { return (x * y) % 5; });  // and gaps
+    Drift options = with(truthAt, true);
+    const Image whole = reconstruct(samples, options).image;
+    std::size_t at = 0;
+    for (int i = 0; i < 3; ++i) {
+        options.band = {i, 3};
+        for (const float value : reconstruct(samples, options).image.pixels) {
+            ASSERT_TRUE(std::isfinite(value));
+            ASSERT_EQ(value, whole.pixels[at++]) << i;
+        }
+    }
+    EXPECT_EQ(at, whole.pixels.size());
+}
+
+TEST(SecondOpinion, OneSampleAPixelHasNoHalvesToJudgeBy) {
+    const SampleBuffer samples = samplesOf([](int, int) { return 1; });
+    const Reconstruction result = reconstruct(samples, with(truthAt, true));
+    EXPECT_FALSE(result.report.drift().secondOpinion->validated);
+    EXPECT_EQ(result.report.drift().secondOpinion->weight, 0.5);
+    EXPECT_LT(errorsOf(result.image).actual, errorsOf(reconstruct(samples, Drift{}).image).actual);
+}
+
+TEST(SecondOpinion, OptionsThatDoNotFitAreErrors) {
+    const SampleBuffer samples = samplesOf(eight);
+    Drift options = with(truthAt, false);
+    options.scale = 2;
+    EXPECT_THROW(reconstruct(samples, options), Error);
+    options = with(truthAt, false);
+    options.radiance = {"R"};
+    EXPECT_THROW(reconstruct(samples, options), Error);
+    SecondOpinion small{Image({-3, 5, 95, 80}, {"R", "G", "B"}), {}};
+    EXPECT_THROW(
+        reconstruct(samples, Drift{.secondOpinion = std::make_shared<SecondOpinion>(std::move(small))}),
+        Error);
+}
+
+TEST(CheckedOpinion, TellsWhatIsWrong) {
+    EXPECT_EQ(checkedOpinion(Image({0, 0, 96, 80}, {"R", "G", "B"}), "a.pfm", kPicture).data, kPicture);
+    EXPECT_EQ(checkedOpinion(opinionOf(1), "a.exr", kPicture).pixels, opinionOf(1).pixels);
+    EXPECT_THROW(checkedOpinion(Image({0, 0, 80, 96}, {"R", "G", "B"}), "a", kPicture), Error);
+    EXPECT_THROW(checkedOpinion(Image({1, 5, 96, 80}, {"R", "G", "B"}), "a", kPicture), Error);
+    EXPECT_THROW(checkedOpinion(Image(kPicture, {"Y"}), "a", kPicture), Error);
+    Image infinite = opinionOf(1);
+    infinite.at(7, 2)[1] = std::numeric_limits<float>::infinity();
+    try {
+        checkedOpinion(infinite, "a", kPicture);
+        FAIL();
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("column 4, row 7"), std::string::npos) << e.what();
+    }
+}
+
+TEST(CertainError, IsALowerBound) {
+    const SampleMeans samples = sampleMeans(samplesOf(eight));
+    const auto share = [](const std::vector<float>& errors) {
+        double found = 0;
+        for (const float e : errors) found += e > 0;
+        return found / static_cast<double>(errors.size());
+    };
+    EXPECT_LT(share(certainError(samples, opinionOf(1))), 0.02);
+    const std::vector<float> dim =
+        certainError(samples, opinionOf(1, [](int x, int y) { return 0.95 * truthAt(x, y); }));
+    EXPECT_GT(share(dim), 0.5);  // by its mean, over a hundred pixels
+    double mean = 0, actual = 0;
+    for (int y = 0; y < kPicture.height; ++y)
+        for (int x = 0; x < kPicture.width; ++x) {
+            mean += static_cast<double>(dim[samples.at(x, y)]);
+            actual += std::pow(0.05 * truthAt(x, y), 2) + 0.03 * 0.03;
+        }
+    EXPECT_LT(mean, actual);
+}
+
+TEST(HalfSamples, AreThoseOfEvenAndOddNumber) {
+    DumpHeader header;
+    header.data = header.display = {0, 0, 2, 1};
+    header.independentHalves = true;
+    header.channels = {{"R"}, {"G"}, {"B"}, {"sample.replicate"}};
+    const std::vector<float> values = {1, 2, 3, 4, 5}, replicate = {0, 0, 1, 1, 2};
+    const SampleBuffer source(
+        header,
+        {0, 0, 2, 1, {0, 4, 5}, {"R", "G", "B", "sample.replicate"}, {values, values, values, replicate}});
+    EXPECT_TRUE(hasReplicates(source));
+    using Values = std::vector<float>;
+    EXPECT_EQ(HalfSamples(source, false, 0).read(0, 1, {"R"}).values[0], (Values{1, 3, 5}));
+    EXPECT_EQ(HalfSamples(source, false, 1).read(0, 1, {"G"}).values[0], (Values{2, 4}));
+    const HalfSamples even(source, true, 0);
+    EXPECT_FALSE(even.header().independentHalves);
+    const SampleBand band = even.read(0, 1);
+    EXPECT_EQ(band.channels.size(), 4U);
+    EXPECT_EQ(band.values[0], (Values{1, 2, 5}));
+    EXPECT_EQ(band.offsets, (std::vector<std::uint64_t>{0, 2, 3}));
+}
+
+}  // namespace
+}  // namespace vlx

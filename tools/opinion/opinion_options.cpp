@@ -1,0 +1,105 @@
+#include "opinion/opinion_options.h"
+
+#include <filesystem>
+
+#include "frames.h"
+#include "opinion/denoiser.h"
+#include "variolux/base/error.h"
+#include "variolux/base/image_io.h"
+#include "variolux/dump/format.h"
+
+namespace vlx {
+
+namespace {
+
+struct FileLayer {
+    std::string file, layer;
+};
+
+/// FILE, or FILE:LAYER where there is no file of the whole name.
+FileLayer splitLayer(const std::string& name) {
+    const std::size_t colon = name.rfind(':');
+    if (colon == std::string::npos || std::filesystem::exists(name)) return {name, ""};
+    return {name.substr(0, colon), name.substr(colon + 1)};
+}
+
+std::vector<std::string> halvesOf(const std::string& both) {
+    const std::size_t comma = both.find(',');
+    if (comma == std::string::npos || comma == 0 || comma + 1 == both.size() ||
+        both.find(',', comma + 1) != std::string::npos)
+        throw CLI::ValidationError("--denoised-halves",
+                                   "expected two images, EVEN,ODD, found '" + both + "'");
+    return {both.substr(0, comma), both.substr(comma + 1)};
+}
+
+Image imageOf(const std::string& name, const Window& window) {
+    const FileLayer of = splitLayer(name);
+    Image image = readImage(of.file);
+    if (!of.layer.empty()) {
+        const auto channels = layerTriple(image.channels, of.layer);
+        if (!channels)
+            throw Error(of.file,
+                        "expected a layer '" + of.layer + "' of R, G and B, found none of that name");
+        image = image.select({channels->begin(), channels->end()});
+        image.channels = {"R", "G", "B"};
+    }
+    return checkedOpinion(std::move(image), of.file, window);
+}
+
+}  // namespace
+
+void OpinionOptions::bind(CLI::App& app) {
+    auto* given =
+        app.add_option("--denoised", denoised,
+                       "krige: combine the estimate with this image, which another denoiser made of the "
+                       "same samples: R, G, B of a file, or of a layer of it. What samples show to be "
+                       "wrong in it does not count")
+            ->option_text("IMAGE[:LAYER]");
+    app.add_option("--denoised-halves", halves,
+                   "Its images of the samples of even and of odd number (of even and odd replicates) alone, "
+                   "as vlx-pack halves writes them: how much either image weighs is then found on samples "
+                   "that it has not seen")
+        ->option_text("EVEN,ODD")
+        ->needs(given);
+    app.add_option("--denoiser", denoiser,
+                   "krige: have a program make the three images: a command, run without a shell, in which "
+                   "{color}, {albedo}, {normal} stand for PFM files to read and {output} for the one to "
+                   "write; oidn is Open Image Denoise's own oidnDenoise, features cleaned first")
+        ->option_text("COMMAND")
+        ->excludes(given);
+}
+
+std::vector<std::string> OpinionOptions::files() const {
+    std::vector<std::string> result;
+    if (!denoised.empty()) result.push_back(splitLayer(denoised).file);
+    if (!halves.empty())
+        for (const std::string& half : halvesOf(halves)) result.push_back(splitLayer(half).file);
+    return result;
+}
+
+OpinionOptions OpinionOptions::ofFrame(int frame) const {
+    OpinionOptions one = *this;
+    one.denoised = frameName(denoised, frame);
+    if (!halves.empty()) {
+        const std::vector<std::string> names = halvesOf(halves);
+        one.halves = frameName(names[0], frame) + "," + frameName(names[1], frame);
+    }
+    return one;
+}
+
+std::shared_ptr<const SecondOpinion> OpinionOptions::read(const std::string& input, bool flat,
+                                                          const Window& window) const {
+    if (!any()) return nullptr;
+    if (flat && (!halves.empty() || !denoiser.empty()))
+        throw CLI::ValidationError(
+            "--denoised-halves and --denoiser go with a dump: a flat image has no samples to halve");
+    if (!denoiser.empty()) return std::make_shared<SecondOpinion>(denoise(denoiser, input, window));
+    SecondOpinion opinion{imageOf(denoised, window), {}};
+    if (!halves.empty()) {
+        const std::vector<std::string> names = halvesOf(halves);
+        opinion.halves = {imageOf(names[0], window), imageOf(names[1], window)};
+    }
+    return std::make_shared<SecondOpinion>(std::move(opinion));
+}
+
+}  // namespace vlx
