@@ -23,8 +23,11 @@ bool hasReplicates(const SampleSource& source) {
     return found.size() > 1;
 }
 
-HalfSamples::HalfSamples(const SampleSource& source, bool replicates, int half)
-    : source_(source), header_(source.header()), replicates_(replicates), half_(static_cast<unsigned>(half)) {
+HalfSamples::HalfSamples(const SampleSource& source, bool replicates, int parity)
+    : source_(source),
+      header_(source.header()),
+      replicates_(replicates),
+      parity_(static_cast<unsigned>(parity)) {
     header_.independentHalves = false;
 }
 
@@ -37,19 +40,19 @@ SampleBand HalfSamples::read(int y, int rows, const std::vector<std::string>& ch
         static_cast<std::size_t>(std::find(wanted.begin(), wanted.end(), kReplicate) - wanted.begin());
     if (replicates_ && replicate == count) wanted.emplace_back(kReplicate);
     const SampleBand all = source_.read(y, rows, wanted);
-    SampleBand half{all.x, all.y, all.width, all.height, {0}, {}, {}};
-    half.channels.assign(wanted.begin(), wanted.begin() + static_cast<std::ptrdiff_t>(count));
-    half.values.resize(count);
+    SampleBand kept{all.x, all.y, all.width, all.height, {0}, {}, {}};
+    kept.channels.assign(wanted.begin(), wanted.begin() + static_cast<std::ptrdiff_t>(count));
+    kept.values.resize(count);
     for (std::size_t p = 0; p < all.pixels(); ++p) {
         for (std::size_t s = all.offsets[p]; s < all.offsets[p + 1]; ++s) {
             const std::size_t number =
                 replicates_ ? replicateNumber(all.values[replicate][s]).value() : s - all.offsets[p];
-            if (number % 2 != half_) continue;
-            for (std::size_t c = 0; c < count; ++c) half.values[c].push_back(all.values[c][s]);
+            if (number % 2 != parity_) continue;
+            for (std::size_t c = 0; c < count; ++c) kept.values[c].push_back(all.values[c][s]);
         }
-        half.offsets.push_back(count > 0 ? half.values[0].size() : 0);
+        kept.offsets.push_back(count > 0 ? kept.values[0].size() : 0);
     }
-    return half;
+    return kept;
 }
 
 }  // namespace vlx

@@ -15,7 +15,7 @@ bool hasReplicates(const SampleSource& source);
 /// has replicates (`replicates`: hasReplicates()), those of its even or odd ones. Refers to the source.
 class HalfSamples : public SampleSource {
   public:
-    HalfSamples(const SampleSource& source, bool replicates, int half);
+    HalfSamples(const SampleSource& source, bool replicates, int parity);
 
     const std::string& path() const override { return source_.path(); }
     /// The source's, but that the halves of a half are not known to be independent.
@@ -26,7 +26,7 @@ class HalfSamples : public SampleSource {
     const SampleSource& source_;
     DumpHeader header_;
     bool replicates_;
-    unsigned half_;
+    unsigned parity_;
 };
 
 }  // namespace vlx
