@@ -219,6 +219,15 @@ void checkMethodOptions(const KrigeOptions& o) {
     checkOptionUse(*o.commandLine, usesByMethod(), atHand);
 }
 
+void checkOpinion(const KrigeOptions& o) {
+    if (!o.opinion.any()) return;
+    if (o.krige.scale != 1 || !o.krige.radiance.empty() || o.krige.strength != 1)
+        throw CLI::ValidationError(
+            "--denoised and --denoiser go without --scale, --radiance and --strength: the other image has no "
+            "such pixels, no such parts, and is no plain average");
+    o.opinion.check();
+}
+
 void checkInputOptions(const KrigeOptions& o, const std::vector<std::string>& atHand) {
     checkOptionUse(*o.commandLine, usesByInput(), atHand);
 }

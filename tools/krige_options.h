@@ -54,6 +54,9 @@ Method methodOf(const KrigeOptions& o);
 /// Throws CLI::ValidationError when an option was given that the method, or its other options, do not read.
 void checkMethodOptions(const KrigeOptions& o);
 
+/// Throws CLI::ValidationError when options for another denoiser's image do not fit.
+void checkOpinion(const KrigeOptions& o);
+
 /// The same of options for dumps or for flat images, `atHand`.
 void checkInputOptions(const KrigeOptions& o, const std::vector<std::string>& atHand);
 

@@ -123,11 +123,8 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     if (!o.samplingMap.empty() && !o.samplingMap.ends_with(".exr"))
         throw CLI::ValidationError("--sampling-map",
                                    "expected a name that ends with .exr, found '" + o.samplingMap + "'");
-    const vlx::Fingerprint made =
-        vlx::fingerprintOf(*o.commandLine,
-                           {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth",
-                            "--denoised", "--denoised-halves"},
-                           files);
+    const vlx::Fingerprint made = vlx::fingerprintOf(
+        *o.commandLine, {"INPUT", "--template", "--variance", "--albedo", "--normal", "--depth"}, files);
     const std::string inputs = write.attributes[vlx::kInputsAttribute] = made.text(o.krige.band);
     std::vector<std::string> outputs = {o.image};
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
@@ -155,7 +152,7 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     vlx::LayerCopy copied;
     vlx::ReconstructionReport report;
     vlx::KrigeOptions withOpinion = o;
-    withOpinion.krige.secondOpinion = o.opinion.read(o.input, flat, dump.header().data);
+    withOpinion.krige.secondOpinion = o.opinion.read(o.input, flat, dump.header().data, o.threads);
     const vlx::Method method = vlx::methodOf(withOpinion);
     if (original.empty() && !o.diagnostics && o.filter == vlx::PixelFilter::Box && o.samplingMap.empty()) {
         const vlx::Image outline = vlx::outline(dump, method);
@@ -200,6 +197,7 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
 
 int run(vlx::KrigeOptions& o) {
     vlx::checkMethodOptions(o);
+    vlx::checkOpinion(o);
     o.paper.colourDistance = !o.noColourDistance;
     if (o.wholeImage) o.paper.regionSize = 0;
     o.krige.standardFeatures = !o.noFeatures;

@@ -68,11 +68,12 @@ TEST_F(KrigeOpinion, WrongImagesAreErrors) {
     expectError(moved, "window");
     Image infinite = rgb;
     infinite.pixels[4] = std::numeric_limits<float>::infinity();
-    expectError(infinite, "finite values, found inf");
+    expectError(infinite, "up to 2^50, found inf");
     EXPECT_EQ(krige({"--denoised", folder / "none.exr"}).exitCode, 1);
     EXPECT_EQ(krige({"--denoised", (folder / "wrong.exr") + ":Layer"}).exitCode, 1);
     EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--denoised-halves", "one.exr"}).exitCode, 2);
-    EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--scale", "2"}).exitCode, 1);
+    EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--scale", "2"}).exitCode, 2);
+    EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--strength", "0.5"}).exitCode, 2);
     EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--method", "paper"}).exitCode, 2);
 }
 
@@ -89,17 +90,19 @@ TEST_F(KrigeOpinion, ADenoiserIsRunOnAllThree) {
 
 TEST_F(KrigeOpinion, WhatADenoiserDoesWrongIsTold) {
     program("fails", "echo 'no licence' >&2; exit 3");
-    const ToolRun failed = krige({"--denoiser", folder / "fails"});
+    const ToolRun failed = krige({"--denoiser", (folder / "fails") + " {color} {output}"});
     EXPECT_EQ(failed.exitCode, 1);
     EXPECT_NE(failed.err.find("failed with exit code 3: no licence"), std::string::npos) << failed.err;
-    const ToolRun missing = krige({"--denoiser", "no-such-denoiser {color}"});
+    const ToolRun missing = krige({"--denoiser", "no-such-denoiser {color} {output}"});
     EXPECT_EQ(missing.exitCode, 1);
     EXPECT_NE(missing.err.find("was not found in PATH"), std::string::npos) << missing.err;
     const ToolRun silent = krige({"--denoiser", "true {color} {output}"});
     EXPECT_EQ(silent.exitCode, 1);
     EXPECT_NE(silent.err.find("found no such file"), std::string::npos) << silent.err;
     const ToolRun open = krige({"--denoiser", "cp '{color} {output}"});
-    EXPECT_EQ(open.exitCode, 1);
+    EXPECT_EQ(open.exitCode, 2);
+    for (const char* bad : {"cp {color}", "cp {colour} {output}", "cp {color} {output} {albedo", ""})
+        EXPECT_EQ(krige({"--denoiser", bad}).exitCode, 2) << bad;
     EXPECT_NE(open.err.find("closing '"), std::string::npos) << open.err;
     EXPECT_FALSE(std::filesystem::exists(out));
 }

@@ -6,12 +6,14 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <sstream>
 
 #include "edit/halves.h"
 #include "process/child_process.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
+#include "variolux/base/parallel.h"
 
 namespace fs = std::filesystem;
 
@@ -38,7 +40,8 @@ class TemporaryFolder {
         std::error_code code;
         std::string name = (fs::temp_directory_path(code) / "vlx-krige-XXXXXX").string();
         if (code || !::mkdtemp(name.data()))
-            throw Error(name, "no temporary folder can be made there: TMPDIR names another place");
+            throw Error(code ? std::string("TMPDIR") : name,
+                        "no temporary folder can be made there: TMPDIR names another place");
         path_ = name;
     }
     ~TemporaryFolder() {
@@ -80,19 +83,24 @@ void runDenoiser(const std::vector<std::string>& words) {
 }
 
 /// Of the pictures PREFIX_color.pfm and so on, with Open Image Denoise's program.
-void runOidn(const std::string& prefix, const std::string& output) {
+void runOidn(const std::string& prefix, const std::string& output, int threads) {
+    std::vector<std::string> limit;
+    if (threads > 0) limit = {"--threads", std::to_string(threads)};
     std::vector<std::string> words = {"oidnDenoise", "--hdr", prefix + "color.pfm"};
     bool features = false;
     for (const auto& [option, name] : {std::pair{"--alb", "albedo"}, {"--nrm", "normal"}}) {
         const std::string noisy = prefix + name + ".pfm", clean = prefix + name + "_clean.pfm";
         // OIDN takes normals with an albedo only.
         if (!fs::exists(noisy) || (std::string(name) == "normal" && !features)) continue;
-        runDenoiser({"oidnDenoise", option, noisy, "-o", clean});
+        std::vector<std::string> cleaning = {"oidnDenoise", option, noisy, "-o", clean};
+        cleaning.insert(cleaning.end(), limit.begin(), limit.end());
+        runDenoiser(cleaning);
         words.insert(words.end(), {option, clean});
         features = true;
     }
     if (features) words.emplace_back("--clean_aux");
     words.insert(words.end(), {"-o", output});
+    words.insert(words.end(), limit.begin(), limit.end());
     runDenoiser(words);
 }
 
@@ -124,7 +132,46 @@ std::vector<std::string> wordsOf(const std::string& command) {
     return words;
 }
 
-SecondOpinion denoise(const std::string& command, const std::string& input, const Window& window) {
+void checkDenoiser(const std::string& command) {
+    if (command == kOidn) return;
+    std::string all;
+    for (const std::string& word : wordsOf(command)) all += word + " ";
+    for (const char* needed : {"{color}", "{output}"})
+        if (all.find(needed) == std::string::npos)
+            throw Error("", std::string("expected ") + needed +
+                                " in a denoiser's command, for the file that it is to " +
+                                (std::string(needed) == "{color}" ? "read" : "write") + ", found none");
+    for (std::size_t at = all.find('{'); at != std::string::npos; at = all.find('{', at + 1)) {
+        const std::size_t end = all.find_first_of("} ", at);
+        const std::string name = all.substr(at + 1, end - at - 1);
+        const bool known =
+            name == "color" || name == "albedo" || name == "normal" || name == "output" || name == "threads";
+        if (!known || all[end] != '}')
+            throw Error("", "expected {color}, {albedo}, {normal}, {output} or {threads}, found {" + name);
+    }
+}
+
+std::vector<std::string> denoiserFiles(const std::string& command) {
+    std::vector<std::string> words =
+        command == kOidn ? std::vector<std::string>{"oidnDenoise"} : wordsOf(command);
+    std::vector<std::string> files;
+    std::error_code ignored;
+    if (words[0].find('/') == std::string::npos) {
+        const char* path = std::getenv("PATH");
+        std::istringstream folders(path ? path : "");
+        for (std::string folder; std::getline(folders, folder, ':');)
+            if (const std::string found = folder + "/" + words[0]; ::access(found.c_str(), X_OK) == 0) {
+                words[0] = found;
+                break;
+            }
+    }
+    for (const std::string& word : words)
+        if (fs::is_regular_file(word, ignored)) files.push_back(word);
+    return files;
+}
+
+SecondOpinion denoise(const std::string& command, const std::string& input, const Window& window,
+                      int threads) {
     const std::vector<std::string> words = command == kOidn ? std::vector<std::string>() : wordsOf(command);
     const TemporaryFolder folder;
     const std::string prefix = folder.path() + "/samples";
@@ -139,9 +186,12 @@ SecondOpinion denoise(const std::string& command, const std::string& input, cons
     const auto imageOf = [&](const std::string& part) {
         const std::string stem = prefix + part, output = folder.path() + "/denoised" + part + "result.pfm";
         if (words.empty()) {
-            runOidn(stem, output);
+            runOidn(stem, output, threads);
         } else {
-            std::map<std::string, std::string> places = {{"color", stem + "color.pfm"}, {"output", output}};
+            std::map<std::string, std::string> places = {
+                {"color", stem + "color.pfm"},
+                {"output", output},
+                {"threads", std::to_string(threads > 0 ? threads : threadCount())}};
             for (const char* feature : {"albedo", "normal"})
                 if (fs::exists(stem + feature + ".pfm")) places[feature] = stem + feature + ".pfm";
             std::vector<std::string> filled;

@@ -49,23 +49,32 @@ Image imageOf(const std::string& name, const Window& window) {
 }  // namespace
 
 void OpinionOptions::bind(CLI::App& app) {
+    const CLI::Validator filled(
+        [](std::string& text) {
+            return text.empty() ? "expected a value, found an empty one" : std::string();
+        },
+        "");
     auto* given =
         app.add_option("--denoised", denoised,
                        "krige: combine the estimate with this image, which another denoiser made of the "
                        "same samples: R, G, B of a file, or of a layer of it. What samples show to be "
                        "wrong in it does not count")
-            ->option_text("IMAGE[:LAYER]");
+            ->option_text("IMAGE[:LAYER]")
+            ->check(filled);
     app.add_option("--denoised-halves", halves,
                    "Its images of the samples of even and of odd number (of even and odd replicates) alone, "
                    "as vlx-pack halves writes them: how much either image weighs is then found on samples "
                    "that it has not seen")
         ->option_text("EVEN,ODD")
+        ->check(filled)
         ->needs(given);
     app.add_option("--denoiser", denoiser,
                    "krige: have a program make the three images: a command, run without a shell, in which "
                    "{color}, {albedo}, {normal} stand for PFM files to read and {output} for the one to "
-                   "write; oidn is Open Image Denoise's own oidnDenoise, features cleaned first")
+                   "write, {threads} for --threads; oidn is Open Image Denoise's own oidnDenoise, features "
+                   "cleaned first")
         ->option_text("COMMAND")
+        ->check(filled)
         ->excludes(given);
 }
 
@@ -74,7 +83,20 @@ std::vector<std::string> OpinionOptions::files() const {
     if (!denoised.empty()) result.push_back(splitLayer(denoised).file);
     if (!halves.empty())
         for (const std::string& half : halvesOf(halves)) result.push_back(splitLayer(half).file);
+    if (!denoiser.empty()) {
+        const std::vector<std::string> programs = denoiserFiles(denoiser);
+        result.insert(result.end(), programs.begin(), programs.end());
+    }
     return result;
+}
+
+void OpinionOptions::check() const {
+    if (!halves.empty()) halvesOf(halves);
+    try {
+        if (!denoiser.empty()) checkDenoiser(denoiser);
+    } catch (const Error& e) {
+        throw CLI::ValidationError("--denoiser", e.what());
+    }
 }
 
 OpinionOptions OpinionOptions::ofFrame(int frame) const {
@@ -88,12 +110,12 @@ OpinionOptions OpinionOptions::ofFrame(int frame) const {
 }
 
 std::shared_ptr<const SecondOpinion> OpinionOptions::read(const std::string& input, bool flat,
-                                                          const Window& window) const {
+                                                          const Window& window, int threads) const {
     if (!any()) return nullptr;
     if (flat && (!halves.empty() || !denoiser.empty()))
         throw CLI::ValidationError(
             "--denoised-halves and --denoiser go with a dump: a flat image has no samples to halve");
-    if (!denoiser.empty()) return std::make_shared<SecondOpinion>(denoise(denoiser, input, window));
+    if (!denoiser.empty()) return std::make_shared<SecondOpinion>(denoise(denoiser, input, window, threads));
     SecondOpinion opinion{imageOf(denoised, window), {}};
     if (!halves.empty()) {
         const std::vector<std::string> names = halvesOf(halves);

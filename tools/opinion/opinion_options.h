@@ -18,15 +18,17 @@ struct OpinionOptions {
 
     void bind(CLI::App& app);
     bool any() const { return !denoised.empty() || !denoiser.empty(); }
-    /// The files named, without layers: `denoised`, then the halves.
+    /// Throws CLI::ValidationError when they do not fit together.
+    void check() const;
+    /// What the result depends on: images, the denoiser's program and files among its arguments.
     std::vector<std::string> files() const;
     /// Of one frame.
     OpinionOptions ofFrame(int frame) const;
 
     /// Reads the images, or has `denoiser` make them of the dump `input`, into a temporary folder. Throws
     /// Error as readImage(), checkedOpinion() and denoise(); CLI::ValidationError when options do not fit.
-    std::shared_ptr<const SecondOpinion> read(const std::string& input, bool flat,
-                                              const Window& window) const;
+    std::shared_ptr<const SecondOpinion> read(const std::string& input, bool flat, const Window& window,
+                                              int threads) const;
 };
 
 }  // namespace vlx

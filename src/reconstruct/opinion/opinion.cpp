@@ -18,6 +18,7 @@ namespace {
 constexpr double kEqualWeights = 0.5;
 constexpr double kPriorData = 10;        // that speak for equal weights
 constexpr double kRelativeError = 1e-3;  // of a value squared: dark pixels are not all that counts
+constexpr float kMostValue = 0x1p50f;    // squares of it are finite floats
 constexpr double kTrimmed = 0.02;        // of the pixels
 constexpr int kJudgedRows = 128;         // of a band at least: margins cost as much again
 constexpr int kApartReach = 4;           // pixels along a row
@@ -73,15 +74,44 @@ double relativeUnit(const SampleMeans& samples, std::size_t pixel, const float* 
     return 1 / (variance + kRelativeError * square);
 }
 
+/// Whether images of halves can judge the whole one: they differ, and the whole one from their mean by less.
+/// Throws Error when each follows the *other* half's noise: (D_A - D_B) (z_A - z_B) is then negative, beyond
+/// three standard errors.
+bool checkHalves(const std::string& name, const SecondOpinion& opinion, const SampleMeans* ofHalf) {
+    const auto& [even, odd] = *opinion.halves;
+    double product = 0, square = 0, whole = 0, between = 0;
+    for (std::size_t p = 0; p < ofHalf[0].mean[0].size(); ++p) {
+        if (!ofHalf[0].known(p) || !ofHalf[1].known(p)) continue;
+        double own = 0;
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double a = even.pixels[3 * p + c], b = odd.pixels[3 * p + c],
+                         d = opinion.image.pixels[3 * p + c];
+            const double u = 1 / (static_cast<double>(ofHalf[0].variance[c][p] + ofHalf[1].variance[c][p]) +
+                                  kRelativeError * (a * a + b * b));
+            own += u * (a - b) * static_cast<double>(ofHalf[0].mean[c][p] - ofHalf[1].mean[c][p]);
+            whole += u * (d - (a + b) / 2) * (d - (a + b) / 2);
+            between += u * (a - b) * (a - b);
+        }
+        product += own;
+        square += own * own;
+    }
+    if (product < -3 * std::sqrt(square))
+        throw Error(name,
+                    "expected --denoised-halves EVEN,ODD, found images that follow each the other half's "
+                    "samples: are they exchanged, or halves of another kind?");
+    return between > 0 && whole <= between;
+}
+
 /// The weight w of the kriging K, of halves, in K w + D (1 - w) that predicts the other half's means z best:
 ///     w = (sum u (z - D) (K - D) + l / 2) / (sum u (K - D)^2 + l),   u = 1 / (v + 1e-3 K^2).
-/// Nothing where no pixel has samples of both halves.
+/// Nothing where no pixel has samples of both halves, or where the whole image is not of their kind.
 std::optional<double> validatedWeight(const SampleSource& source, const Drift& options, Steps& steps) {
     const bool replicates = hasReplicates(source);
     double product = 0, square = 0;
     std::int64_t judged = 0;
     const HalfSamples samples[] = {{source, replicates, 0}, {source, replicates, 1}};
     const SampleMeans ofHalf[] = {sampleMeans(samples[0]), sampleMeans(samples[1])};
+    if (!checkHalves(source.path(), *options.secondOpinion, ofHalf)) return std::nullopt;
     for (int half = 0; half < 2; ++half) {
         const SampleMeans& means = ofHalf[1 - half];
         const Image& denoised = (*options.secondOpinion->halves)[static_cast<std::size_t>(half)];
@@ -105,28 +135,45 @@ std::optional<double> validatedWeight(const SampleSource& source, const Drift& o
     return std::clamp((product + kPriorData * kEqualWeights) / (square + kPriorData), 0.0, 1.0);
 }
 
-/// Without halves nothing is honest but what is certain: equal weights, or, where the other image's certain
-/// errors e outweigh a draft's predicted ones s^2 over the picture, sum u e / (sum u e + sum u s^2), without
-/// the pixels of the largest u e: places tell of themselves only, and only many of them of the image.
+/// The sum of all but the largest kTrimmed of them: places tell of themselves only, and only many of them of
+/// the image.
+double trimmedSum(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    values.resize(values.size() - static_cast<std::size_t>(kTrimmed * static_cast<double>(values.size())));
+    return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+/// Without halves: equal weights, or what two bounds of the other image's squared error say against a draft's
+/// predicted s^2, bound / (bound + sum u s^2), if that is more: its certain errors, sum u e, and its distance
+/// from the draft beyond the draft's own error, sum u (D - K)^2 - sum u s^2. Two that err by s^2 each differ
+/// by at most twice that unless their errors are opposite.
 double certainWeight(const SampleSource& source, const Drift& options, const SampleMeans& samples,
                      const std::vector<float>& certain, Steps& steps) {
-    std::vector<double> wrong;
-    double predicted = 0;
+    const Image& denoised = options.secondOpinion->image;
+    std::vector<double> wrong, apart, own;
     for (const Band& band : judgedBands(source.header().data.height))
         forDraftRows(source, options, band, steps, [&](int y, const float* row, int channels) {
             for (int x = 0; x < samples.width; ++x) {
                 const std::size_t p = samples.at(x, y);
+                if (!samples.known(p)) continue;
                 const float *k = row + std::ptrdiff_t{x} * channels, *s = k + channels - 3;
                 const double u = relativeUnit(samples, p, k);
-                wrong.push_back(u * static_cast<double>(certain[p]));
-                for (int c = 0; c < 3; ++c)
+                double predicted = 0, distance = 0;
+                for (int c = 0; c < 3; ++c) {
+                    const auto d = static_cast<double>(denoised.at(x, y)[c] - k[c]);
+                    distance += u * d * d / 3;
                     predicted += u * static_cast<double>(s[c]) * static_cast<double>(s[c]) / 3;
+                }
+                wrong.push_back(u * static_cast<double>(certain[p]));
+                apart.push_back(distance);
+                own.push_back(predicted);
             }
         });
-    std::sort(wrong.begin(), wrong.end());
-    wrong.resize(wrong.size() - static_cast<std::size_t>(kTrimmed * static_cast<double>(wrong.size())));
-    const double sum = std::accumulate(wrong.begin(), wrong.end(), 0.0);
-    return std::max(kEqualWeights, sum > 0 ? sum / (sum + predicted) : 0);
+    const double predicted = trimmedSum(std::move(own));
+    double weight = kEqualWeights;
+    for (const double bound : {trimmedSum(std::move(wrong)), trimmedSum(std::move(apart)) - predicted})
+        if (bound > 0) weight = std::max(weight, bound / (bound + predicted));
+    return weight;
 }
 
 /// Combines finished rows with the other image.
@@ -216,9 +263,9 @@ Image checkedOpinion(Image image, const std::string& name, const Window& window)
     Image result = image.select({"R", "G", "B"});
     result.data = window;
     for (std::size_t p = 0; p < result.pixels.size(); ++p)
-        if (!std::isfinite(result.pixels[p])) {
+        if (!(std::abs(result.pixels[p]) <= kMostValue)) {
             const auto pixel = static_cast<std::int64_t>(p / 3);
-            throw Error(name, "expected finite values, found " + std::to_string(result.pixels[p]) +
+            throw Error(name, "expected finite values up to 2^50, found " + std::to_string(result.pixels[p]) +
                                   " at column " + std::to_string(window.x + pixel % window.width) + ", row " +
                                   std::to_string(window.y + pixel / window.width));
         }
