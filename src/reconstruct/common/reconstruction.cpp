@@ -183,7 +183,8 @@ std::string inWords(const DriftReport& report) {
     if (const auto& of = report.secondOpinion)
         text << "the kriging weighs " << 100 * of->weight << " %, the other image the rest ("
              << (of->validated ? "validated on samples that neither had seen"
-                               : "not validated: images of halves of the samples, made as the whole one, would tell more")
+                               : "not validated: images of halves of the samples, made as the whole one, "
+                                 "would tell more")
              << "); in " << 100 * of->yielded << " % of the pixels samples speak against the other image, in "
              << 100 * of->limited << " % its pull is limited to " << kOpinionDeviations
              << " standard deviations\n";
