@@ -17,7 +17,7 @@ constexpr CombinedPlanes kCombined{3};
 
 PixelRows pixelRows(int width, int height, int features) {
     return {RowRing(width, kData.channels(), height), RowRing(width, SquaresPlanes::kChannels, height),
-            RowRing(width, 2 * features, height)};
+            RowRing(width, FeaturePlanes{features}.rawChannels(), height)};
 }
 
 TEST(HalveRow, MeansStayThoseOfTheSamePixelsAndCountsTellTheirVariance) {
