@@ -297,6 +297,7 @@ ReconstructionReport reconstructWithOpinion(const SampleSource& source, const Dr
         if (opinion.halves) weight = validatedWeight(source, options, steps);
         report.validated = weight.has_value();
         report.weight = weight ? *weight : certainWeight(source, options, samples, certain, steps);
+        steps.all = steps.before + outline.data.height;  // halves may not have been judged
     }
     Combiner combiner(opinion.image, certain, report.weight, report.validated, picture.width,
                       outline.channelCount(), outline.data.y - picture.y);
