@@ -86,6 +86,28 @@ TEST_F(PrefilterTest, NoiseIsAveragedAndWhatIsLeftIsKnown) {
     EXPECT_NEAR(errors().actual / before.actual, 1, 0.05);  // noise is in one half only
 }
 
+TEST_F(PrefilterTest, AHalfsWeightsAreTheOthers) {
+    // B is the same everywhere: all weights of A are 1, however much its values differ beside their errors.
+    draw(0, 4);
+    for (int y = 0; y < kLines; ++y)
+        for (int x = 0; x < kColumns; ++x)
+            for (int f = 0; f < 3; ++f) {
+                const float a = truth.row(f, y)[x] + raw.row(kFeaturePlanes.difference(f), y)[x];
+                raw.row(kFeaturePlanes.value(f), y)[x] = (a + 0.5f) / 2;
+                raw.row(kFeaturePlanes.difference(f), y)[x] = (a - 0.5f) / 2;
+                raw.row(kFeaturePlanes.error(f), y)[x] = 1e-6f;
+            }
+    prefilter();
+    constexpr int kX = 40, kY = 30, kSide = 2 * kFeatureReach + 1;
+    double sum = 0;
+    for (int y = kY - kFeatureReach; y <= kY + kFeatureReach; ++y)
+        for (int x = kX - kFeatureReach; x <= kX + kFeatureReach; ++x)
+            sum += static_cast<double>(raw.row(kFeaturePlanes.value(0), y)[x] +
+                                       raw.row(kFeaturePlanes.difference(0), y)[x]);
+    // B's weights, from A, move nothing: it has one value.
+    EXPECT_NEAR(features.row(kFeaturePlanes.value(0), kY)[kX], (sum / (kSide * kSide) + 0.5) / 2, 1e-5);
+}
+
 TEST_F(PrefilterTest, WhatBothHalvesShowIsGivenBack) {
     draw(kHalfNoise / 2, 4);  // less than a half's noise: patches look alike
     prefilter();

@@ -119,6 +119,41 @@ TEST(SecondOpinion, AWrongOneCostsNextToNothing) {
         }
 }
 
+TEST(SecondOpinion, MovesNoPixelBeyondTwoOfItsDeviations) {
+    const SampleBuffer samples = samplesOf(eightSamples);
+    const Image alone = reconstruct(samples, Drift{}).image;
+    // Wild in single pixels, of which no window can be certain.
+    const Image both =
+        reconstruct(
+            samples,
+            withOpinion([](int x, int y) { return truthAt(x, y) + (x % 11 == 3 && y % 13 == 5 ? 20 : 0); },
+                        false))
+            .image;
+    for (std::size_t p = 0; p < alone.pixels.size(); p += 6)
+        for (std::size_t c = 0; c < 3; ++c)
+            ASSERT_LE(std::abs(both.pixels[p + c] - alone.pixels[p + c]), 2.0001f * alone.pixels[p + 3 + c])
+                << p;
+}
+
+TEST(SecondOpinion, YieldsWhereItIsWrongAndNowhereElse) {
+    const SampleBuffer samples = samplesOf(eightSamples);
+    const Image alone = reconstruct(samples, Drift{}).image;
+    const auto hidden = [](int x, int y) { return x >= 16 && x < 40 && y >= 16 && y < 40; };
+    const Image both =
+        reconstruct(samples,
+                    withOpinion([&](int x, int y) { return hidden(x, y) ? 0.0 : truthAt(x, y); }, true))
+            .image;
+    double error[2][2] = {};  // hidden or not, of alone and both
+    for (int y = 0; y < kPicture.height; ++y)
+        for (int x = 0; x < kPicture.width; ++x)
+            for (int c = 0; c < 3; ++c)
+                for (const Image* image : {&alone, &both})
+                    error[hidden(x, y)][image == &both] +=
+                        std::pow(static_cast<double>(image->at(x, y)[c]) - truthAt(x, y), 2);
+    EXPECT_LT(error[1][1], 1.3 * error[1][0]);  // its border is in windows of both; 4 times without any
+    EXPECT_LT(error[0][1], 0.9 * error[0][0]);
+}
+
 TEST(SecondOpinion, BandsAreTheWholeImage) {
     const SampleBuffer samples = samplesOf([](int x, int y) { return (x * y) % 5; });  // and gaps
     Drift options = withOpinion(truthAt, true);
@@ -146,6 +181,9 @@ TEST(SecondOpinion, OptionsThatDoNotFitAreErrors) {
     const SampleBuffer samples = samplesOf(eightSamples);
     Drift options = withOpinion(truthAt, false);
     options.scale = 2;
+    EXPECT_THROW(reconstruct(samples, options), Error);
+    options = withOpinion(truthAt, false);
+    options.strength = 0.5;
     EXPECT_THROW(reconstruct(samples, options), Error);
     options = withOpinion(truthAt, false);
     options.radiance = {"R"};

@@ -128,8 +128,8 @@ struct Drift {
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
 
     /// What another denoiser made of the same samples, to be combined with the estimate (second_opinion.h;
-    /// METHOD.md 7.11): R, G, B and their error. Not with a scale above 1, nor with `radiance`, whose parts
-    /// would not add up.
+    /// METHOD.md 7.11): R, G, B and their error. Not with a scale above 1, a strength below 1, nor with
+    /// `radiance`, whose parts would not add up.
     std::shared_ptr<const SecondOpinion> secondOpinion = {};
 
     /// Bytes that the process may take, at most (resident memory, as the kernel counts it); 0: any number.

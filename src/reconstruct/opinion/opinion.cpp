@@ -49,7 +49,6 @@ void forDraftRows(const SampleSource& source, const Drift& options, const Band& 
     Drift draft = options;
     draft.quality = Quality::Draft;
     draft.secondOpinion = nullptr;
-    draft.strength = 1;
     draft.diagnostics = false;
     draft.inspect.clear();
     draft.band = band;
@@ -217,11 +216,13 @@ class Combiner {
                 const double move = std::clamp(full, -most, most);
                 limited = limited || move != full;
                 // A validated q is the least squares': what is left is s^2 - q^2 (D - K)^2. Of two estimates
-                // that err by s^2 each it is s^2 - q (1 - q) (D - K)^2. Farther apart, one of them is wrong.
-                const double q = apart != 0 ? move / apart : 0, known = validated_ ? q * q : q * (1 - q);
+                // that err by s^2 each it is s^2 - q (1 - q) (D - K)^2. Farther apart, one of them is wrong;
+                // but what was moved by m from an estimate that errs by s^2 errs by no more than s^2 + m^2.
+                const double own2 = deviation * deviation, q = apart != 0 ? move / apart : 0,
+                             known = validated_ ? q * q : q * (1 - q);
                 const double variance =
-                    std::max({deviation * deviation - known * static_cast<double>(apart2[c][i]),
-                              move * (apart - move), deviation * deviation / 4});
+                    std::max({own2 - known * static_cast<double>(apart2[c][i]),
+                              std::min(move * (apart - move), own2 + move * move), own2 / 4});
                 k[c] += static_cast<float>(move);
                 s[c] = static_cast<float>(std::sqrt(variance));
             }
