@@ -363,9 +363,7 @@ std::optional<std::string> Drift::validate() const {
     if (!(strength >= 0 && strength <= 1))
         return "expected a strength of 0 to 1, found " + std::to_string(strength);
     if (secondOpinion && (scale != 1 || strength != 1 || !radiance.empty()))
-        return "expected neither a scale nor a strength nor further radiance with another denoiser's image: "
-               "it "
-               "has no such pixels and no such parts, and is no plain average";
+        return "expected no scale, strength or radiance with another denoiser's image, which has none";
     if (scale < 1 || scale > 4) return "expected a scale of 1 to 4, found " + std::to_string(scale);
     if (band.count < 1 || band.index < 0 || band.index >= band.count)
         return "expected a band from 1 to " + std::to_string(band.count) + ", found " +
