@@ -14,7 +14,7 @@ const std::vector<OptionUse>& usesByMethod() {
     static const std::vector<OptionUse> uses = {
         {{"--quality", "--fireflies", "--strength", "--feature", "--radiance", "--scale", "--filter",
           "--band", "--no-features", "--without", "--max-memory", "--denoised", "--denoised-halves",
-          "--denoiser"},
+          "--denoiser", "--assess", "--assess-halves"},
          {"--method krige"}},
         {{"--clamp"}, {"--fireflies clamp"}},
         {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
@@ -223,8 +223,13 @@ void checkOpinion(const KrigeOptions& o) {
     if (!o.opinion.any()) return;
     if (o.krige.scale != 1 || !o.krige.radiance.empty() || o.krige.strength != 1)
         throw CLI::ValidationError(
-            "--denoised and --denoiser go without --scale, --radiance and --strength: the other image has no "
-            "such pixels, no such parts, and is no plain average");
+            "--denoised, --denoiser and --assess go without --scale, --radiance and --strength: the other "
+            "image has no such pixels, no such parts, and is no plain average");
+    if (o.opinion.assesses() && (!o.layersOf.empty() || !o.band.empty() || !o.maxMemory.empty() ||
+                                 !o.samplingMap.empty() || o.diagnostics || o.filter != PixelFilter::Box))
+        throw CLI::ValidationError(
+            "--assess goes without --template, --band, --max-memory, --sampling-map, --diagnostics and "
+            "--filter: it writes an error map of the whole picture");
     o.opinion.check();
 }
 

@@ -22,6 +22,7 @@
 #include "variolux/dump/layers.h"
 #include "variolux/dump/positions.h"
 #include "variolux/dump/reader.h"
+#include "variolux/reconstruct/assessment.h"
 #include "variolux/reconstruct/pixel_filter.h"
 #include "variolux/reconstruct/reconstruct.h"
 #include "variolux/reconstruct/sampling_map.h"
@@ -101,6 +102,21 @@ void tell(const vlx::SampleSource& source, const std::string& original, const vl
     vlx::say(text);
 }
 
+void assessed(const vlx::KrigeOptions& o, const vlx::SampleSource& samples, const vlx::Drift& method,
+              const vlx::Fingerprint& made, const vlx::ImageWriteOptions& write,
+              const vlx::Progress& progress) {
+    const vlx::Assessment of = vlx::assess(samples, method, progress);
+    made.checkUnchanged();
+    vlx::writeImage(o.image, of.map, write);
+    if (o.json) {
+        std::printf("%s\n", vlx::toJson(of.report).c_str());
+    } else {
+        std::string text = vlx::toText(of.report);
+        text.pop_back();
+        vlx::say(o.opinion.assessed + ": " + text);
+    }
+}
+
 void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     std::vector<std::string> files = o.moments.files();
     files.insert(files.end(), {o.input, o.layersOf});
@@ -114,7 +130,8 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     const bool flat = vlx::isFlatImage(o.input);
     // What the result becomes a part of.
     std::string original = o.layersOf;
-    if (original.empty() && flat && !o.dropLayers && vlx::isOpenExr(o.input)) original = o.input;
+    if (original.empty() && flat && !o.dropLayers && !o.opinion.assesses() && vlx::isOpenExr(o.input))
+        original = o.input;
     if (!original.empty() && (!o.band.empty() || o.krige.scale != 1 || !o.maxMemory.empty()))
         throw CLI::ValidationError(
             "--band, --scale and --max-memory go with --drop-layers or a dump, without --template");
@@ -153,6 +170,7 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     vlx::ReconstructionReport report;
     vlx::KrigeOptions withOpinion = o;
     withOpinion.krige.secondOpinion = o.opinion.read(o.input, flat, dump.header().data, o.threads);
+    if (o.opinion.assesses()) return assessed(o, dump, withOpinion.krige, made, write, progress);
     const vlx::Method method = vlx::methodOf(withOpinion);
     if (original.empty() && !o.diagnostics && o.filter == vlx::PixelFilter::Box && o.samplingMap.empty()) {
         const vlx::Image outline = vlx::outline(dump, method);

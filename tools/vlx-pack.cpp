@@ -80,6 +80,7 @@ struct SampleCommand {
 struct SubsetCommand {
     std::string input;
     std::string dump;
+    std::string half;
     bool overwrite = false;
     vlx::SubsetOptions options;
     const CLI::App* commandLine = nullptr;
@@ -95,25 +96,38 @@ struct SubsetCommand {
             "  vlx-pack subset room.exr -o room_4b.exr --samples 4 --part 1");
         app.add_option("DUMP", input, "The dump to take samples from")->required();
         app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
-        app.add_option("--samples", options.samples, "Samples a pixel to keep")
-            ->check(CLI::Range(1u, 1u << 24))
-            ->required();
+        auto* samples = app.add_option("--samples", options.samples, "Samples a pixel to keep")
+                            ->check(CLI::Range(1u, 1u << 24));
         app.add_option("--part", options.part,
                        "Which of the sub-sets of this size; those of one seed share no samples")
             ->check(CLI::Range(0u, 1u << 24))
+            ->needs(samples)
             ->capture_default_str();
         app.add_option("--seed", options.seed, "Another seed, another division into sub-sets")
+            ->needs(samples)
             ->capture_default_str();
+        app.add_option(
+               "--half", half,
+               "Keep the samples of even or odd number instead (of even or odd replicates), as vlx-pack "
+               "halves: for a denoiser that reads dumps, whose images vlx-krige is to judge")
+            ->check(CLI::IsMember({"even", "odd"}))
+            ->option_text("even|odd")
+            ->excludes(samples);
         vlx::addCompression(app, options.compression);
         vlx::addOverwrite(app, overwrite);
     }
 
     int run() {
         vlx::checkOutputName(dump, {input});
+        if (commandLine->count("--samples") + commandLine->count("--half") == 0)
+            throw CLI::RequiredError("--samples or --half");
         options.inputs = vlx::fingerprintOf(*commandLine, {"DUMP"}, {input}).text();
         if (!overwrite && vlx::isFinished({dump}, options.inputs)) return vlx::kDone;
         vlx::ProgressBar bar("dividing");
-        vlx::subsetDump(input, dump, options, bar);
+        if (half.empty())
+            vlx::subsetDump(input, dump, options, bar);
+        else
+            vlx::writeHalfDump(input, dump, half == "odd", options.compression, options.inputs, bar);
         return vlx::kDone;
     }
 };
@@ -135,7 +149,10 @@ struct HalvesCommand {
         app.footer(
             "Example:\n"
             "  vlx-pack halves room.exr -o room\n"
-            "  oidnDenoise --hdr room_color.pfm --alb room_albedo.pfm --nrm room_normal.pfm -o denoised.pfm");
+            "  for part in _ _even_ _odd_; do\n"
+            "      oidnDenoise --hdr room${part}color.pfm -o room${part}denoised.pfm; done\n"
+            "  vlx-krige room.exr -o best.exr --denoised room_denoised.pfm \\\n"
+            "      --denoised-halves room_even_denoised.pfm,room_odd_denoised.pfm");
         app.add_option("DUMP", input, "The dump: a deep scanline OpenEXR file, of any renderer")->required();
         app.add_option("-o,--output", prefix, "What the names of the pictures begin with")
             ->required()

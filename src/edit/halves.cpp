@@ -11,6 +11,7 @@
 #include "variolux/base/output_file.h"
 #include "variolux/dump/half_samples.h"
 #include "variolux/dump/reader.h"
+#include "variolux/dump/writer.h"
 
 namespace vlx {
 
@@ -138,6 +139,36 @@ HalvesReport writeHalves(const std::string& dump, const std::string& prefix, con
         report.files.push_back(file->path());
     }
     return report;
+}
+
+std::uint64_t writeHalfDump(const std::string& dump, const std::string& output, int parity,
+                            DumpCompression compression, const std::string& inputs,
+                            const Progress& progress) {
+    const DumpReader reader(dump);
+    const bool replicates = hasReplicates(reader);
+    const HalfSamples half(reader, replicates, parity);
+    DumpHeader header = half.header();
+    setInputs(header, inputs);
+    header.splatReplicates = 0;  // the samples hold them
+    header.compression = compression;
+    if (header.samples) *header.samples /= 2;
+    const double renderSeconds = header.renderSeconds.value_or(0);
+    header.renderSeconds.reset();  // close() records it
+    DumpWriter writer(output, header);
+    const Window& window = header.data;
+    std::uint64_t kept = 0;
+    for (int row = 0; row < window.height; row += kBandRows) {
+        const int count = std::min(kBandRows, window.height - row);
+        SampleBand band = half.read(window.y + row, count);
+        kept += band.samples();
+        if (replicates)
+            for (float& value : band.values[static_cast<std::size_t>(band.channel(kReplicateChannel))])
+                value = static_cast<float>(replicateNumber(value).value() / 2);
+        writer.write(std::move(band));
+        if (progress) progress(row + count, window.height);
+    }
+    writer.close(renderSeconds / 2);
+    return kept;
 }
 
 }  // namespace vlx

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "variolux/base/progress.h"
+#include "variolux/dump/format.h"
 
 /// The pictures that other denoisers start from: of all samples of a dump, and of two halves of them.
 namespace vlx {
@@ -27,5 +28,15 @@ struct HalvesReport {
 /// Values that are not finite count as 0 in features. Works by bands of rows. Nothing is left under the final
 /// names unless all are whole. Throws Error as DumpReader, and when a file cannot be written.
 HalvesReport writeHalves(const std::string& dump, const std::string& prefix, const Progress& progress = {});
+
+/// Writes a dump of the samples of even, 0, or odd number, 1, of each pixel, those that the pictures of a
+/// half are the mean of, for denoisers that read dumps. Replicates are numbered anew, 0 for 0 and 1, 1 for 2
+/// and
+/// 3. Windows, channels and attributes stay; variolux:samples and variolux:renderSeconds become their share.
+/// `inputs` is for the header's kInputsAttribute. Returns the number of samples. Works by bands of rows.
+/// Throws Error as DumpReader and DumpWriter.
+std::uint64_t writeHalfDump(const std::string& dump, const std::string& output, int parity,
+                            DumpCompression compression = DumpCompression::Rle,
+                            const std::string& inputs = {}, const Progress& progress = {});
 
 }  // namespace vlx

@@ -77,6 +77,44 @@ TEST_F(KrigeOpinion, WrongImagesAreErrors) {
     EXPECT_EQ(krige({"--denoised", folder / "rgb.exr", "--method", "paper"}).exitCode, 2);
 }
 
+TEST_F(KrigeOpinion, AnImageIsAssessed) {
+    ASSERT_EQ(runTool("vlx-pack", {"halves", kSamples, "-o", folder / "h,1"}).exitCode, 0);
+    const std::string image = folder / "h,1_color.pfm";
+    const ToolRun run = krige({"--assess", image, "--assess-halves",
+                               folder / "h,1_even_color.pfm" + "," + (folder / "h,1_odd_color.pfm")});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const auto report = nlohmann::json::parse(run.out);
+    EXPECT_GT(report["high"].get<double>(), report["relMse"].get<double>());
+    EXPECT_LT(report["low"].get<double>(), report["relMse"].get<double>());
+    EXPECT_FALSE(report["byHalves"].is_null());
+    EXPECT_EQ(readImage(out).channels, (std::vector<std::string>{"confidence", "bias.R", "bias.G", "bias.B",
+                                                                 "stddev.R", "stddev.G", "stddev.B"}));
+    // The plain average's error, as its own samples tell it.
+    ASSERT_EQ(krige({"--method", "mean"}).exitCode, 0);
+    const Image mean = readImage(out);
+    double own = 0;
+    for (std::size_t p = 0; p < static_cast<std::size_t>(mean.data.pixels()); ++p)
+        for (const char* c : {"R", "G", "B"}) {
+            const auto width = static_cast<std::size_t>(mean.channelCount());
+            const double x = mean.pixels[p * width + static_cast<std::size_t>(mean.channel(c))],
+                         s = mean.pixels[p * width +
+                                         static_cast<std::size_t>(mean.channel(std::string("stddev.") + c))];
+            own += s * s / (x * x + 0.01) / 3 / static_cast<double>(mean.data.pixels());
+        }
+    EXPECT_NEAR(report["relMse"].get<double>() / own, 1, 0.5);
+    const auto alone = krige({"--assess", image});
+    ASSERT_EQ(alone.exitCode, 0) << alone.err;
+    EXPECT_TRUE(nlohmann::json::parse(alone.out)["byHalves"].is_null());
+    for (const std::vector<std::string>& bad :
+         {std::vector<std::string>{"--assess", image, "--denoised", image},
+          {"--assess-halves", "a,b"},
+          {"--assess", image, "--assess-halves", "even"},
+          {"--assess", image, "--band", "1/2"},
+          {"--assess", image, "--max-memory", "1G"},
+          {"--assess", image, "--method", "mean"}})
+        EXPECT_EQ(krige(bad).exitCode, 2) << bad.back();
+}
+
 TEST_F(KrigeOpinion, ADenoiserIsRunOnAllThree) {
     program("copy it", "echo \"$1\" >> '" + (folder / "calls") + "'; cp \"$1\" \"$2\"");
     const auto report = reportOf(krige({"--denoiser", "'" + (folder / "copy it") + "' {color} {output}"}));

@@ -260,6 +260,25 @@ TEST(VlxCompareSweep, ReportedStagesAndPlacesOfAnExternalMethod) {
     EXPECT_TRUE(all[1]["stages"].contains("read"));
 }
 
+TEST(VlxCompareSweep, AnExternalMethodIsAssessedWithoutAReference) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out", calls = folder / "calls";
+    const ToolRun run =
+        sweep({kDump, "-o", out, "--spp", "8", "--seeds", "1", "--methods", "mean", "--no-vary", "--external",
+               "copy=echo {input} >> " + calls + "; cp {input} {output}", "--target", "predicted_relmse=9"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    const auto all = records(out);
+    ASSERT_EQ(all.size(), 3u);
+    // Its image is the first part of the dump, the plain average, whose error map says as much.
+    const auto mean = all[1]["values"], copy = all[2]["values"];
+    EXPECT_NEAR(copy["predicted_relmse"].get<double>() / mean["predicted_relmse"].get<double>(), 1, 0.5);
+    EXPECT_LT(copy["assessed_low"].get<double>(), copy["predicted_relmse"].get<double>());
+    EXPECT_GT(copy["assessed_high"].get<double>(), copy["predicted_relmse"].get<double>());
+    const std::string inputs = contentsOf(calls);
+    EXPECT_EQ(std::count(inputs.begin(), inputs.end(), '\n'), 3) << inputs;  // all, even, odd
+    EXPECT_FALSE(std::filesystem::exists(out + "/scratch"));
+}
+
 TEST(VlxCompareSweep, BadInputIsToldBeforeAnythingIsRun) {
     const TemporaryFolder folder;
     const std::string out = folder / "out";

@@ -11,6 +11,8 @@
 #include "../base/temporary_folder.h"
 #include "../dump/test_dumps.h"
 #include "variolux/base/error.h"
+#include "variolux/dump/half_samples.h"
+#include "variolux/dump/reader.h"
 
 namespace vlx {
 namespace {
@@ -101,6 +103,28 @@ TEST(Halves, WhatIsMissingIsCounted) {
     EXPECT_EQ(report.missingInHalves, 1);
     EXPECT_EQ(pfm(folder / "x_even_color.pfm")[0], 2);
     EXPECT_EQ(pfm(folder / "x_odd_color.pfm")[0], 2);
+}
+
+TEST(Halves, AreDumpsToo) {
+    const TemporaryFolder folder;
+    TestDump dump = counting(true, true);
+    dump.header.samples = 4;
+    writeDump(folder / "all.exr", dump);
+    const DumpReader all(folder / "all.exr");
+    for (const int parity : {0, 1}) {
+        EXPECT_EQ(writeHalfDump(folder / "all.exr", folder / "half.exr", parity), dump.all.samples() / 2);
+        const DumpReader half(folder / "half.exr");
+        EXPECT_EQ(half.header().samples, 2);
+        EXPECT_EQ(half.header().data, kOf);
+        const HalfSamples wanted(all, true, parity);
+        const SampleBand kept = half.read(kOf.y, kOf.height, {"R", "albedo.G"}),
+                         expected = wanted.read(kOf.y, kOf.height, {"R", "albedo.G"});
+        EXPECT_EQ(kept.values, expected.values);
+        EXPECT_EQ(kept.offsets, expected.offsets);
+        const SampleBand numbers = half.read(kOf.y, kOf.height, {"sample.replicate"});
+        for (const float replicate : numbers.values[0])
+            EXPECT_EQ(replicate, 0);  // 0 and 1 of all are 0 of each half
+    }
 }
 
 TEST(Halves, LeaveNothingWhereTheyCannotBeWritten) {

@@ -5,60 +5,14 @@
 
 #include <cmath>
 #include <functional>
-#include <random>
 
+#include "opinion_pictures.h"
 #include "reconstruct/opinion/evidence.h"
 #include "variolux/base/error.h"
 #include "variolux/dump/half_samples.h"
-#include "variolux/dump/sample_buffer.h"
-#include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 namespace {
-
-const Window kPicture{-3, 5, 96, 80};
-constexpr double kSampleNoise = 0.4;  // of a sample, relative
-
-double truthAt(int x, int y) {
-    const double shade = 1 + 0.4 * std::sin(0.15 * x) * std::cos(0.1 * y);
-    return shade * ((x / 12 + y / 12) % 2 ? 0.3 : 1);
-}
-
-/// `count(x, y)` samples a pixel.
-SampleBuffer samplesOf(const std::function<int(int, int)>& count) {
-    std::mt19937_64 random(11);
-    std::normal_distribution<double> normal(1, kSampleNoise);
-    DumpHeader header;
-    header.data = header.display = kPicture;
-    header.channels = {{"R"}, {"G"}, {"B"}};
-    SampleBand band{kPicture.x, kPicture.y, kPicture.width, kPicture.height, {0}, {"R", "G", "B"}, {}};
-    band.values.resize(3);
-    for (int y = 0; y < kPicture.height; ++y)
-        for (int x = 0; x < kPicture.width; ++x) {
-            for (int i = 0; i < count(x, y); ++i)
-                for (auto& values : band.values)
-                    values.push_back(static_cast<float>(truthAt(x, y) * normal(random)));
-            band.offsets.push_back(band.values[0].size());
-        }
-    return {header, std::move(band)};
-}
-
-/// The truth with noise of the seed; `of` makes a wrong image of it.
-Image opinionOf(unsigned seed, const std::function<double(int, int)>& of = truthAt) {
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal(0, 0.03);
-    Image image(kPicture, {"R", "G", "B"});
-    for (int y = 0; y < kPicture.height; ++y)
-        for (int x = 0; x < kPicture.width; ++x)
-            for (int c = 0; c < 3; ++c) image.at(x, y)[c] = static_cast<float>(of(x, y) + normal(random));
-    return image;
-}
-
-Drift withOpinion(const std::function<double(int, int)>& of, bool halves) {
-    SecondOpinion opinion{opinionOf(1, of), {}};
-    if (halves) opinion.halves = {opinionOf(2, of), opinionOf(3, of)};
-    return {.secondOpinion = std::make_shared<SecondOpinion>(std::move(opinion))};
-}
 
 struct OpinionErrors {
     double actual = 0, predicted = 0;
@@ -77,8 +31,6 @@ OpinionErrors errorsOf(const Image& image) {
             }
     return mean;
 }
-
-int eightSamples(int, int) { return 8; }
 
 TEST(SecondOpinion, ARightOneHelpsAndTheErrorMapKnows) {
     const SampleBuffer samples = samplesOf(eightSamples);

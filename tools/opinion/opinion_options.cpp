@@ -23,13 +23,34 @@ FileLayer splitLayer(const std::string& name) {
     return {name.substr(0, colon), name.substr(colon + 1)};
 }
 
-std::vector<std::string> halvesOf(const std::string& both) {
-    const std::size_t comma = both.find(',');
-    if (comma == std::string::npos || comma == 0 || comma + 1 == both.size() ||
-        both.find(',', comma + 1) != std::string::npos)
-        throw CLI::ValidationError("--denoised-halves",
-                                   "expected two images, EVEN,ODD, found '" + both + "'");
-    return {both.substr(0, comma), both.substr(comma + 1)};
+/// EVEN,ODD, at the comma that leaves names of files on both sides, else at the first.
+std::vector<std::string> halvesOf(const char* option, const std::string& both) {
+    std::vector<std::string> halves;
+    for (std::size_t comma = both.find(','); comma != std::string::npos; comma = both.find(',', comma + 1)) {
+        const std::string even = both.substr(0, comma), odd = both.substr(comma + 1);
+        if (even.empty() || odd.empty()) continue;
+        const bool found =
+            std::filesystem::exists(splitLayer(even).file) && std::filesystem::exists(splitLayer(odd).file);
+        if (found || halves.empty()) halves = {even, odd};
+        if (found) return halves;
+    }
+    if (halves.empty() || halves[1].find(',') != std::string::npos)
+        throw CLI::ValidationError(option, "expected two images, EVEN,ODD, found '" + both + "'");
+    return halves;
+}
+
+/// What is given: images to be combined or to be judged.
+struct GivenImages {
+    std::string whole;
+    std::vector<std::string> halves;
+};
+
+GivenImages givenImages(const OpinionOptions& o) {
+    GivenImages given{o.assesses() ? o.assessed : o.denoised, {}};
+    if (o.assesses() ? !o.assessedHalves.empty() : !o.halves.empty())
+        given.halves = o.assesses() ? halvesOf("--assess-halves", o.assessedHalves)
+                                    : halvesOf("--denoised-halves", o.halves);
+    return given;
 }
 
 Image imageOf(const std::string& name, const Window& window) {
@@ -76,13 +97,29 @@ void OpinionOptions::bind(CLI::App& app) {
         ->option_text("COMMAND")
         ->check(filled)
         ->excludes(given);
+    auto* judged =
+        app.add_option("--assess", assessed,
+                       "krige: judge this image, which another denoiser made of the same samples, without a "
+                       "reference: OUTPUT gets its error map instead (layers stddev; bias, where it is "
+                       "significant; confidence, the chance that what samples differ by from it is noise), "
+                       "and its relMSE is printed with a 95 % interval")
+            ->option_text("IMAGE[:LAYER]")
+            ->check(filled)
+            ->excludes(given)
+            ->excludes("--denoiser");
+    app.add_option("--assess-halves", assessedHalves,
+                   "Its images of the samples of even and of odd number alone, as for --denoised-halves: a "
+                   "narrower interval, without assumptions")
+        ->option_text("EVEN,ODD")
+        ->check(filled)
+        ->needs(judged);
 }
 
 std::vector<std::string> OpinionOptions::files() const {
     std::vector<std::string> result;
-    if (!denoised.empty()) result.push_back(splitLayer(denoised).file);
-    if (!halves.empty())
-        for (const std::string& half : halvesOf(halves)) result.push_back(splitLayer(half).file);
+    const GivenImages given = givenImages(*this);
+    if (!given.whole.empty()) result.push_back(splitLayer(given.whole).file);
+    for (const std::string& half : given.halves) result.push_back(splitLayer(half).file);
     if (!denoiser.empty()) {
         const std::vector<std::string> programs = denoiserFiles(denoiser);
         result.insert(result.end(), programs.begin(), programs.end());
@@ -91,7 +128,7 @@ std::vector<std::string> OpinionOptions::files() const {
 }
 
 void OpinionOptions::check() const {
-    if (!halves.empty()) halvesOf(halves);
+    givenImages(*this);
     try {
         if (!denoiser.empty()) checkDenoiser(denoiser);
     } catch (const Error& e) {
@@ -101,26 +138,23 @@ void OpinionOptions::check() const {
 
 OpinionOptions OpinionOptions::ofFrame(int frame) const {
     OpinionOptions one = *this;
-    one.denoised = frameName(denoised, frame);
-    if (!halves.empty()) {
-        const std::vector<std::string> names = halvesOf(halves);
-        one.halves = frameName(names[0], frame) + "," + frameName(names[1], frame);
-    }
+    for (std::string* names : {&one.denoised, &one.halves, &one.assessed, &one.assessedHalves})
+        *names = frameName(*names, frame);
     return one;
 }
 
 std::shared_ptr<const SecondOpinion> OpinionOptions::read(const std::string& input, bool flat,
                                                           const Window& window, int threads) const {
     if (!any()) return nullptr;
-    if (flat && (!halves.empty() || !denoiser.empty()))
+    const GivenImages given = givenImages(*this);
+    if (flat && (!given.halves.empty() || !denoiser.empty()))
         throw CLI::ValidationError(
-            "--denoised-halves and --denoiser go with a dump: a flat image has no samples to halve");
+            "--denoised-halves, --assess-halves and --denoiser go with a dump: a flat image has no samples "
+            "to halve");
     if (!denoiser.empty()) return std::make_shared<SecondOpinion>(denoise(denoiser, input, window, threads));
-    SecondOpinion opinion{imageOf(denoised, window), {}};
-    if (!halves.empty()) {
-        const std::vector<std::string> names = halvesOf(halves);
-        opinion.halves = {imageOf(names[0], window), imageOf(names[1], window)};
-    }
+    SecondOpinion opinion{imageOf(given.whole, window), {}};
+    if (!given.halves.empty())
+        opinion.halves = {imageOf(given.halves[0], window), imageOf(given.halves[1], window)};
     return std::make_shared<SecondOpinion>(std::move(opinion));
 }
 

@@ -15,9 +15,12 @@ struct OpinionOptions {
     std::string denoised;
     std::string halves;    ///< EVEN,ODD
     std::string denoiser;  ///< a command, or "oidn"
+    std::string assessed;  ///< to be judged, not combined
+    std::string assessedHalves;
 
     void bind(CLI::App& app);
-    bool any() const { return !denoised.empty() || !denoiser.empty(); }
+    bool assesses() const { return !assessed.empty(); }
+    bool any() const { return !denoised.empty() || !denoiser.empty() || assesses(); }
     /// Throws CLI::ValidationError when they do not fit together.
     void check() const;
     /// What the result depends on: images, the denoiser's program and files among its arguments.

@@ -43,7 +43,8 @@ struct SweepCommand {
             ->required();
         app.add_option("--reference", o.reference,
                        "Image to measure errors against; without one the errors are those that the error "
-                       "maps predict")
+                       "maps predict, and of images without a map those that vlx-krige --assess tells "
+                       "(for which their command is run twice more)")
             ->option_text("IMAGE");
         app.add_option("--seeds", o.seeds, "Repetitions with independent samples, for the intervals")
             ->check(CLI::Range(1, 1000))

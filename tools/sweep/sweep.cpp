@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "process/child_process.h"
+#include "sweep/assess_image.h"
 #include "sweep/machine.h"
 #include "sweep/sweep_command.h"
 #include "sweep/sweep_images.h"
@@ -213,7 +214,7 @@ class Runner {
         if (run.exitCode != 0)
             record.failure = failureOf(run);
         else
-            judge(record, run, image);
+            judge(record, run, image, dump, task);
         if (record.failure.empty() && !record.file.empty())
             moveTo(plan_.options.folder + "/" + record.file, image);
         else
@@ -223,7 +224,8 @@ class Runner {
     }
 
     /// Metrics, predicted error and stages of an image that was made.
-    void judge(SweepRecord& record, const ProcessRun& run, const std::string& path) const {
+    void judge(SweepRecord& record, const ProcessRun& run, const std::string& path, const std::string& dump,
+               const Task& task) const {
         try {
             const Image image = readImage(path);
             const Image colour = colourOf(image, path);
@@ -246,6 +248,9 @@ class Runner {
                 const PredictedError predicted = predictedError(colour, *stddev, path);
                 record.values["predicted_rmse"] = predicted.rmse;
                 record.values["predicted_relmse"] = predicted.relMse;
+            } else if (!plan_.reference) {
+                const std::string command = plan_.methodCommand(*task.method, record.sampling, record.seed);
+                record.values.merge(assessedErrors(plan_, command, dump, path, scratch() + "/" + record.key));
             }
         } catch (const Error& error) {
             record.failure = error.what();

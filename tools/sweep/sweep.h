@@ -107,9 +107,10 @@ struct SweepRecord {
     double load = 0;                       ///< running processes a minute ago (load average): other work
     std::map<std::string, double> stages;  ///< wall seconds of its parts, as the command reports them
     /// Of Image: metrics by metricInfos' names when there is a reference; predicted_rmse and predicted_relmse
-    /// where the image has a stddev layer, with a reference also exact_pixels, those without error that know
-    /// it; floor, the relMSE that a reference with a stddev layer adds by its own noise, on average; sigma
-    /// where the command has one. Of Sampling by vlx-trace: trace_cpu_seconds, write_cpu_seconds.
+    /// where the image has a stddev layer, or where there is no reference (assess_image.h), with a reference
+    /// also exact_pixels, those without error that know it; floor, the relMSE that a reference with a stddev
+    /// layer adds by its own noise, on average; sigma where the command has one. Of Sampling by vlx-trace:
+    /// trace_cpu_seconds, write_cpu_seconds.
     std::map<std::string, double> values;
     std::optional<Reliability> reliability;  ///< with a reference and a stddev layer
     std::string file;  ///< kept image, or regions' JSON, relative to the folder; may be empty

@@ -168,6 +168,7 @@ std::string SweepPlan::imageKey(const std::string& sampling, const SweepMethod& 
         .add("sampling", sampling)
         .add("reference", referenceIdentity)
         .add("program", programs.at(firstWord(command)).second)
+        .add("judge", reference ? "" : programs.at("vlx-krige").second)  // assess_image.h
         .add("files", methodFiles.at(method.name))
         .text();
 }
