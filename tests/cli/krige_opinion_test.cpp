@@ -124,6 +124,15 @@ TEST_F(KrigeOpinion, ADenoiserIsRunOnAllThree) {
     for (std::string line; std::getline(calls, line); ++count)
         EXPECT_FALSE(std::filesystem::exists(line)) << "the temporary folder is gone";
     EXPECT_EQ(count, 3);
+    // Of one sample a pixel there are no halves.
+    ASSERT_EQ(runTool("vlx-pack", {"subset", kSamples, "-o", folder / "one.exr", "--samples", "1"}).exitCode,
+              0);
+    const ToolRun one = runTool("vlx-krige", {folder / "one.exr", "-o", out, "--overwrite", "--denoiser",
+                                              "'" + (folder / "copy it") + "' {color} {output}"});
+    EXPECT_EQ(one.exitCode, 0) << one.err;
+    std::ifstream more(folder / "calls");
+    for (std::string line; std::getline(more, line);) --count;
+    EXPECT_EQ(count, -1);
 }
 
 TEST_F(KrigeOpinion, WhatADenoiserDoesWrongIsTold) {

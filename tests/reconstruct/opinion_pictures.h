@@ -20,16 +20,17 @@ inline double truthAt(int x, int y) {
 }
 
 /// `count(x, y)` samples a pixel.
-inline SampleBuffer samplesOf(const std::function<int(int, int)>& count, unsigned seed = 11) {
+inline SampleBuffer samplesOf(const std::function<int(int, int)>& count, unsigned seed = 11,
+                              const Window& picture = kPicture) {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal(1, kSampleNoise);
     DumpHeader header;
-    header.data = header.display = kPicture;
+    header.data = header.display = picture;
     header.channels = {{"R"}, {"G"}, {"B"}};
-    SampleBand band{kPicture.x, kPicture.y, kPicture.width, kPicture.height, {0}, {"R", "G", "B"}, {}};
+    SampleBand band{picture.x, picture.y, picture.width, picture.height, {0}, {"R", "G", "B"}, {}};
     band.values.resize(3);
-    for (int y = 0; y < kPicture.height; ++y)
-        for (int x = 0; x < kPicture.width; ++x) {
+    for (int y = 0; y < picture.height; ++y)
+        for (int x = 0; x < picture.width; ++x) {
             for (int i = 0; i < count(x, y); ++i)
                 for (auto& values : band.values)
                     values.push_back(static_cast<float>(truthAt(x, y) * normal(random)));
@@ -40,12 +41,12 @@ inline SampleBuffer samplesOf(const std::function<int(int, int)>& count, unsigne
 
 /// The truth with noise of the seed; `of` makes a wrong image of it.
 inline Image opinionOf(unsigned seed, const std::function<double(int, int)>& of = truthAt,
-                       double noise = 0.03) {
+                       double noise = 0.03, const Window& picture = kPicture) {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal(0, noise);
-    Image image(kPicture, {"R", "G", "B"});
-    for (int y = 0; y < kPicture.height; ++y)
-        for (int x = 0; x < kPicture.width; ++x)
+    Image image(picture, {"R", "G", "B"});
+    for (int y = 0; y < picture.height; ++y)
+        for (int x = 0; x < picture.width; ++x)
             for (int c = 0; c < 3; ++c) image.at(x, y)[c] = static_cast<float>(of(x, y) + normal(random));
     return image;
 }

@@ -9,6 +9,7 @@
 #include "opinion_pictures.h"
 #include "reconstruct/opinion/evidence.h"
 #include "variolux/base/error.h"
+#include "variolux/dump/cropped_samples.h"
 #include "variolux/dump/half_samples.h"
 
 namespace vlx {
@@ -121,6 +122,24 @@ TEST(SecondOpinion, BandsAreTheWholeImage) {
     EXPECT_EQ(at, whole.pixels.size());
 }
 
+TEST(SecondOpinion, TilesOfALargePictureTellTheWeight) {
+    const Window strip{5, -7, 800, 24};  // judged in two tiles, not in the whole
+    const SampleBuffer samples = samplesOf(eightSamples, 11, strip);
+    // Right on the left: both tiles count, wherever they lie.
+    const auto half = [](int x, int y) { return x < 400 ? truthAt(x, y) : 0.5 * truthAt(x, y); };
+    const auto weight = [&](const std::function<double(int, int)>& of) {
+        SecondOpinion opinion{opinionOf(1, of, 0.03, strip), {}};
+        opinion.halves = {opinionOf(2, of, 0.04, strip), opinionOf(3, of, 0.04, strip)};
+        const Drift options{.secondOpinion = std::make_shared<SecondOpinion>(std::move(opinion))};
+        const SecondOpinionReport report = reconstruct(samples, options).report.drift().secondOpinion.value();
+        EXPECT_TRUE(report.validated);
+        return report.weight;
+    };
+    EXPECT_LT(weight(truthAt), 0.4);
+    EXPECT_GT(weight(half), 0.5);
+    EXPECT_GT(weight([](int, int) { return 0.0; }), 0.9);
+}
+
 TEST(SecondOpinion, OneSampleAPixelHasNoHalvesToJudgeBy) {
     const SampleBuffer samples = samplesOf([](int, int) { return 1; });
     const Reconstruction result = reconstruct(samples, withOpinion(truthAt, true));
@@ -201,6 +220,29 @@ TEST(HalfSamples, AreThoseOfEvenAndOddNumber) {
     EXPECT_EQ(band.channels.size(), 4U);
     EXPECT_EQ(band.values[0], (Values{1, 2, 5}));
     EXPECT_EQ(band.offsets, (std::vector<std::uint64_t>{0, 2, 3}));
+}
+
+TEST(CroppedSamples, AreThoseOfTheirPart) {
+    const SampleBuffer all = samplesOf([](int x, int y) { return (x + 2 * y) % 4; });
+    const Window part{10, 20, 30, 17};
+    const CroppedSamples cropped(all, part);
+    EXPECT_EQ(cropped.header().data, part);
+    EXPECT_EQ(cropped.header().display, kPicture);
+    const SampleBand whole = all.read(22, 5), kept = cropped.read(22, 5);
+    EXPECT_EQ(kept.x, part.x);
+    ASSERT_EQ(kept.pixels(), 150U);
+    for (std::size_t row = 0; row < 5; ++row)
+        for (std::size_t x = 0; x < 30; ++x) {
+            const std::size_t p = row * 96 + 13 + x, q = row * 30 + x;
+            ASSERT_EQ(kept.offsets[q + 1] - kept.offsets[q], whole.offsets[p + 1] - whole.offsets[p]);
+            for (std::uint64_t i = 0; i < kept.offsets[q + 1] - kept.offsets[q]; ++i)
+                ASSERT_EQ(kept.values[2][kept.offsets[q] + i], whole.values[2][whole.offsets[p] + i]);
+        }
+    EXPECT_EQ(kept.values[0].size(), kept.offsets.back());
+    EXPECT_THROW(cropped.read(19, 3), Error);
+    EXPECT_THROW(cropped.read(36, 2), Error);
+    for (const Window& outside : {Window{-4, 20, 5, 5}, Window{90, 20, 4, 5}, Window{0, 5, 5, 0}})
+        EXPECT_THROW(CroppedSamples(all, outside), Error);
 }
 
 }  // namespace

@@ -182,7 +182,7 @@ SecondOpinion denoise(const std::string& command, const std::string& input, cons
     }
     leftBehind.push_back(folder.path());
     onEndingSignal(endDenoiser);
-    writeHalves(input, prefix);
+    const HalvesReport written = writeHalves(input, prefix);
     const auto imageOf = [&](const std::string& part) {
         const std::string stem = prefix + part, output = folder.path() + "/denoised" + part + "result.pfm";
         if (words.empty()) {
@@ -210,7 +210,9 @@ SecondOpinion denoise(const std::string& command, const std::string& input, cons
         return checkedOpinion(readImage(output), output, window);
     };
     SecondOpinion opinion{imageOf("_"), {}};
-    opinion.halves = {imageOf("_even_"), imageOf("_odd_")};
+    // Of one sample a pixel halves tell nothing.
+    if (written.missingInHalves + written.emptyPixels < window.pixels())
+        opinion.halves = {imageOf("_even_"), imageOf("_odd_")};
     return opinion;
 }
 

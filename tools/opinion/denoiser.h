@@ -20,12 +20,12 @@ void checkDenoiser(const std::string& command);
 std::vector<std::string> denoiserFiles(const std::string& command);
 
 /// Runs another denoiser three times, without a shell: on the means of all samples of the dump `input`, of
-/// those of even and of odd number (edit/halves.h). In each word {color}, {albedo}, {normal} are the PFM
-/// files, {output} the PFM that it is to write, and {threads} a number, all processors where `threads` is 0.
-/// "oidn" is Open Image Denoise's own program oidnDenoise by its best recipe: features, where there are any,
-/// are cleaned first, and the image is denoised with them. Files lie in a temporary folder, which is removed.
-/// Throws Error, with what the command said last, when it fails or writes no image of the samples' size; when
-/// it names a feature that the dump lacks.
+/// those of even and of odd number (edit/halves.h); once where no pixel has samples of both. In each word
+/// {color}, {albedo}, {normal} are the PFM files, {output} the PFM that it is to write, and {threads} a
+/// number, all processors where `threads` is 0. "oidn" is Open Image Denoise's own program oidnDenoise by its
+/// best recipe: features, where there are any, are cleaned first, and the image is denoised with them. Files
+/// lie in a temporary folder, which is removed. Throws Error, with what the command said last, when it fails
+/// or writes no image of the samples' size; when it names a feature that the dump lacks.
 SecondOpinion denoise(const std::string& command, const std::string& input, const Window& window,
                       int threads);
 

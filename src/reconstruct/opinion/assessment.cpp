@@ -124,8 +124,13 @@ Assessment assess(const SampleSource& source, const Drift& options, const Progre
         sum += halves.value / (halves.error * halves.error);
     }
     if (report.byMap > 0) {
-        report.relMse = std::max(sum / precision, 1 / std::sqrt(precision) / kInterval);
-        const double deviation = std::hypot(1 / std::sqrt(precision), kUnitError * report.relMse);
+        // Two that contradict each other are both less sure than they say (Birge's ratio).
+        const double contradiction = halves.error > 0 ? std::abs(halves.value - report.byMap) /
+                                                            std::hypot(halves.error, report.byMapError)
+                                                      : 0;
+        const double both = std::max(1.0, contradiction) / std::sqrt(precision);
+        report.relMse = std::max(sum / precision, both / kInterval);
+        const double deviation = std::hypot(both, kUnitError * report.relMse);
         const double factor = std::exp(kInterval * deviation / report.relMse);
         report.low = report.relMse / factor;
         report.high = report.relMse * factor;

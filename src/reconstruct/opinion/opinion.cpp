@@ -9,6 +9,7 @@
 #include "reconstruct/opinion/evidence.h"
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
+#include "variolux/dump/cropped_samples.h"
 #include "variolux/dump/half_samples.h"
 
 namespace vlx {
@@ -16,21 +17,32 @@ namespace vlx {
 namespace {
 
 constexpr double kEqualWeights = 0.5;
-constexpr double kPriorData = 10;        // that speak for equal weights
-constexpr double kRelativeError = 1e-3;  // of a value squared: dark pixels are not all that counts
-constexpr float kMostValue = 0x1p50f;    // squares of it are finite floats
-constexpr double kTrimmed = 0.02;        // of the pixels
-constexpr int kJudgedRows = 128;         // of a band at least: margins cost as much again
-constexpr int kApartReach = 4;           // pixels along a row
+constexpr double kPriorData = 10;         // that speak for equal weights
+constexpr double kRelativeError = 1e-3;   // of a value squared: dark pixels are not all that counts
+constexpr float kMostValue = 0x1p50f;     // squares of it are finite floats
+constexpr double kTrimmed = 0.02;         // of the pixels
+constexpr int kTile = 256;                // pixels along an axis
+constexpr double kJudgedShare = 1 / 8.0;  // of a picture of many tiles
+constexpr int kTileBorder = 12;           // pixels that have neighbours on one side only, as a picture's have
+constexpr int kApartReach = 4;            // pixels along a row
 
-/// Every third band of rows, or the whole of a small picture: what the weight is found in. A third of the
-/// rows tells it as well as all.
-std::vector<Band> judgedBands(int height) {
-    const int thirds = height / (3 * kJudgedRows);
-    if (thirds == 0) return {{}};
-    std::vector<Band> bands;
-    for (int i = 0; i < thirds; ++i) bands.push_back({3 * i + 1, 3 * thirds});
-    return bands;
+/// Where the weight is found: tiles spread over the picture, two at least, each a picture of its own; the
+/// whole of a picture of up to three tiles.
+std::vector<Window> judgedTiles(const Window& picture) {
+    const int width = std::min(kTile, picture.width), height = std::min(kTile, picture.height);
+    const double tiles = static_cast<double>(picture.pixels()) / (double{1} * width * height);
+    if (tiles <= 3) return {picture};
+    const int count = std::max(2, static_cast<int>(std::lround(kJudgedShare * tiles)));
+    std::vector<Window> result;
+    for (int i = 0; i < count; ++i) {
+        const double along = (i + 0.5) / count, across = std::fmod(0.25 + 0.618 * i, 1.0);
+        const bool wide = picture.width > picture.height;
+        result.push_back(
+            {picture.x + static_cast<int>(std::lround((wide ? along : across) * (picture.width - width))),
+             picture.y + static_cast<int>(std::lround((wide ? across : along) * (picture.height - height))),
+             width, height});
+    }
+    return result;
 }
 
 /// Rows of progress so far, and of all.
@@ -43,25 +55,36 @@ struct Steps {
     }
 };
 
-/// A draft of some rows of the picture, row by row; channels are R, G, B first and stddev.R, .G, .B last.
+/// A draft of samples, pixel by pixel: column and row from the corner of their window, channels R, G, B first
+/// and stddev.R, .G, .B last. Not those beside a border that is not the picture's.
 template <class F>
-void forDraftRows(const SampleSource& source, const Drift& options, const Band& band, Steps& steps, F row) {
+void forDraftPixels(const SampleSource& source, const Window& picture, const Drift& options, Steps& steps,
+                    F pixel) {
     Drift draft = options;
     draft.quality = Quality::Draft;
     draft.secondOpinion = nullptr;
     draft.diagnostics = false;
     draft.inspect.clear();
-    draft.band = band;
+    draft.band = {};
+    const Window& part = source.header().data;
+    const auto borderOf = [](int first, int of) { return first == of ? 0 : kTileBorder; };
+    const int left = borderOf(part.x, picture.x), top = borderOf(part.y, picture.y);
+    const int right = part.width - borderOf(part.x + part.width, picture.x + picture.width);
+    const int bottom = part.height - borderOf(part.y + part.height, picture.y + picture.height);
     const Image outline = driftOutline(source, draft);
-    int y = outline.data.y - source.header().data.y;
-    const std::ptrdiff_t stride = std::ptrdiff_t{outline.data.width} * outline.channelCount();
+    const int channels = outline.channelCount();
+    int y = 0;
     reconstructDrift(
         source, draft,
         [&](const float* rows, int count) {
-            for (int i = 0; i < count; ++i, ++y) row(y, rows + i * stride, outline.channelCount());
+            for (int i = 0; i < count; ++i, ++y) {
+                if (y < top || y >= bottom) continue;
+                for (int x = left; x < right; ++x)
+                    pixel(x, y, rows + (std::ptrdiff_t{i} * part.width + x) * channels, channels);
+            }
         },
         steps.next());
-    steps.before += outline.data.height;
+    steps.before += part.height;
 }
 
 double relativeUnit(const SampleMeans& samples, std::size_t pixel, const float* kriged) {
@@ -73,65 +96,82 @@ double relativeUnit(const SampleMeans& samples, std::size_t pixel, const float* 
     return 1 / (variance + kRelativeError * square);
 }
 
-/// Whether images of halves can judge the whole one: they differ, and the whole one from their mean by less.
-/// Throws Error when each follows the *other* half's noise: (D_A - D_B) (z_A - z_B) is then negative, beyond
-/// three standard errors.
-bool checkHalves(const std::string& name, const SecondOpinion& opinion, const SampleMeans* ofHalf) {
+/// Sums over the tiles that halves are judged in.
+struct HalvesSums {
+    double follow = 0, follow2 = 0;  ///< sum of (D_A - D_B) (z_A - z_B), and of its square
+    double whole = 0, between = 0;   ///< of the squared distance of D from their mean, and of D_A from D_B
+    double product = 0, square = 0;  ///< of (z - D) (K - D) and of (K - D)^2
+    std::int64_t judged = 0;
+};
+
+void compareHalves(const SecondOpinion& opinion, const SampleMeans* ofHalf, const Window& tile,
+                   HalvesSums& sums) {
     const auto& [even, odd] = *opinion.halves;
-    double product = 0, square = 0, whole = 0, between = 0;
-    for (std::size_t p = 0; p < ofHalf[0].mean[0].size(); ++p) {
-        if (!ofHalf[0].known(p) || !ofHalf[1].known(p)) continue;
-        double own = 0;
-        for (std::size_t c = 0; c < 3; ++c) {
-            const double a = even.pixels[3 * p + c], b = odd.pixels[3 * p + c],
-                         d = opinion.image.pixels[3 * p + c];
-            const double u = 1 / (static_cast<double>(ofHalf[0].variance[c][p] + ofHalf[1].variance[c][p]) +
-                                  kRelativeError * (a * a + b * b));
-            own += u * (a - b) * static_cast<double>(ofHalf[0].mean[c][p] - ofHalf[1].mean[c][p]);
-            whole += u * (d - (a + b) / 2) * (d - (a + b) / 2);
-            between += u * (a - b) * (a - b);
+    const int left = tile.x - even.data.x, top = tile.y - even.data.y;
+    for (int y = 0; y < tile.height; ++y)
+        for (int x = 0; x < tile.width; ++x) {
+            const std::size_t p = ofHalf[0].at(x, y);
+            if (!ofHalf[0].known(p) || !ofHalf[1].known(p)) continue;
+            const float *const e = even.at(left + x, top + y), *const o = odd.at(left + x, top + y),
+                               *const all = opinion.image.at(left + x, top + y);
+            double follow = 0;
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double a = e[c], b = o[c], d = all[c];
+                const double u =
+                    1 / (static_cast<double>(ofHalf[0].variance[c][p] + ofHalf[1].variance[c][p]) +
+                         kRelativeError * (a * a + b * b));
+                follow += u * (a - b) * static_cast<double>(ofHalf[0].mean[c][p] - ofHalf[1].mean[c][p]);
+                sums.whole += u * (d - (a + b) / 2) * (d - (a + b) / 2);
+                sums.between += u * (a - b) * (a - b);
+            }
+            sums.follow += follow;
+            sums.follow2 += follow * follow;
         }
-        product += own;
-        square += own * own;
-    }
-    if (product < -3 * std::sqrt(square))
+}
+
+/// Throws Error when images of halves follow each the *other* half's noise: (D_A - D_B) (z_A - z_B) is then
+/// negative, beyond three standard errors.
+void requireOwnHalves(const std::string& name, const HalvesSums& sums) {
+    if (sums.follow < -3 * std::sqrt(sums.follow2))
         throw Error(name,
                     "expected --denoised-halves EVEN,ODD, found images that follow each the other half's "
                     "samples: are they exchanged, or halves of another kind?");
-    return between > 0 && whole <= between;
 }
 
 /// The weight w of the kriging K, of halves, in K w + D (1 - w) that predicts the other half's means z best:
 ///     w = (sum u (z - D) (K - D) + l / 2) / (sum u (K - D)^2 + l),   u = 1 / (v + 1e-3 K^2).
-/// Nothing where no pixel has samples of both halves, or where the whole image is not of their kind.
+/// Nothing where no pixel has samples of both halves, or where the whole image is not of the halves' kind: it
+/// differs from their mean by more than they from each other.
 std::optional<double> validatedWeight(const SampleSource& source, const Drift& options, Steps& steps) {
+    const SecondOpinion& opinion = *options.secondOpinion;
+    const Window& picture = source.header().data;
     const bool replicates = hasReplicates(source);
-    double product = 0, square = 0;
-    std::int64_t judged = 0;
-    const HalfSamples samples[] = {{source, replicates, 0}, {source, replicates, 1}};
-    const SampleMeans ofHalf[] = {sampleMeans(samples[0]), sampleMeans(samples[1])};
-    if (!checkHalves(source.path(), *options.secondOpinion, ofHalf)) return std::nullopt;
-    for (int half = 0; half < 2; ++half) {
-        const SampleMeans& means = ofHalf[1 - half];
-        const Image& denoised = (*options.secondOpinion->halves)[static_cast<std::size_t>(half)];
-        for (const Band& band : judgedBands(source.header().data.height))
-            forDraftRows(samples[half], options, band, steps, [&](int y, const float* row, int channels) {
-                for (int x = 0; x < means.width; ++x) {
-                    const std::size_t p = means.at(x, y);
-                    if (!ofHalf[0].known(p) || !ofHalf[1].known(p)) continue;
-                    ++judged;
-                    const float *k = row + std::ptrdiff_t{x} * channels, *d = denoised.at(x, y);
-                    const double u = relativeUnit(means, p, k);
-                    for (std::size_t c = 0; c < 3; ++c) {
-                        const double apart = static_cast<double>(k[c] - d[c]);
-                        product += u * static_cast<double>(means.mean[c][p] - d[c]) * apart;
-                        square += u * apart * apart;
-                    }
+    HalvesSums sums;
+    for (const Window& tile : judgedTiles(picture)) {
+        const CroppedSamples part(source, tile);
+        const HalfSamples samples[] = {{part, replicates, 0}, {part, replicates, 1}};
+        const SampleMeans ofHalf[] = {sampleMeans(samples[0]), sampleMeans(samples[1])};
+        compareHalves(opinion, ofHalf, tile, sums);
+        requireOwnHalves(source.path(), sums);
+        for (int half = 0; half < 2; ++half) {
+            const SampleMeans& means = ofHalf[1 - half];
+            const Image& denoised = (*opinion.halves)[static_cast<std::size_t>(half)];
+            forDraftPixels(samples[half], picture, options, steps, [&](int x, int y, const float* k, int) {
+                const std::size_t p = means.at(x, y);
+                if (!ofHalf[0].known(p) || !ofHalf[1].known(p)) return;
+                ++sums.judged;
+                const float* const d = denoised.at(tile.x - picture.x + x, tile.y - picture.y + y);
+                const double u = relativeUnit(means, p, k);
+                for (std::size_t c = 0; c < 3; ++c) {
+                    const double apart = static_cast<double>(k[c] - d[c]);
+                    sums.product += u * static_cast<double>(means.mean[c][p] - d[c]) * apart;
+                    sums.square += u * apart * apart;
                 }
             });
+        }
     }
-    if (judged == 0) return std::nullopt;
-    return std::clamp((product + kPriorData * kEqualWeights) / (square + kPriorData), 0.0, 1.0);
+    if (sums.judged == 0 || sums.between == 0 || sums.whole > sums.between) return std::nullopt;
+    return std::clamp((sums.product + kPriorData * kEqualWeights) / (sums.square + kPriorData), 0.0, 1.0);
 }
 
 /// The sum of all but the largest kTrimmed of them: places tell of themselves only, and only many of them of
@@ -149,25 +189,26 @@ double trimmedSum(std::vector<double> values) {
 double certainWeight(const SampleSource& source, const Drift& options, const SampleMeans& samples,
                      const std::vector<float>& certain, Steps& steps) {
     const Image& denoised = options.secondOpinion->image;
+    const Window& picture = source.header().data;
     std::vector<double> wrong, apart, own;
-    for (const Band& band : judgedBands(source.header().data.height))
-        forDraftRows(source, options, band, steps, [&](int y, const float* row, int channels) {
-            for (int x = 0; x < samples.width; ++x) {
-                const std::size_t p = samples.at(x, y);
-                if (!samples.known(p)) continue;
-                const float *k = row + std::ptrdiff_t{x} * channels, *s = k + channels - 3;
-                const double u = relativeUnit(samples, p, k);
-                double predicted = 0, distance = 0;
-                for (int c = 0; c < 3; ++c) {
-                    const auto d = static_cast<double>(denoised.at(x, y)[c] - k[c]);
-                    distance += u * d * d / 3;
-                    predicted += u * static_cast<double>(s[c]) * static_cast<double>(s[c]) / 3;
-                }
-                wrong.push_back(u * static_cast<double>(certain[p]));
-                apart.push_back(distance);
-                own.push_back(predicted);
-            }
-        });
+    for (const Window& tile : judgedTiles(picture))
+        forDraftPixels(CroppedSamples(source, tile), picture, options, steps,
+                       [&](int column, int row, const float* k, int channels) {
+                           const int x = tile.x - picture.x + column, y = tile.y - picture.y + row;
+                           const std::size_t p = samples.at(x, y);
+                           if (!samples.known(p)) return;
+                           const float* const s = k + channels - 3;
+                           const double u = relativeUnit(samples, p, k);
+                           double predicted = 0, distance = 0;
+                           for (int c = 0; c < 3; ++c) {
+                               const auto d = static_cast<double>(denoised.at(x, y)[c] - k[c]);
+                               distance += u * d * d / 3;
+                               predicted += u * static_cast<double>(s[c]) * static_cast<double>(s[c]) / 3;
+                           }
+                           wrong.push_back(u * static_cast<double>(certain[p]));
+                           apart.push_back(distance);
+                           own.push_back(predicted);
+                       });
     const double predicted = trimmedSum(std::move(own));
     double weight = kEqualWeights;
     for (const double bound : {trimmedSum(std::move(wrong)), trimmedSum(std::move(apart)) - predicted})
@@ -287,8 +328,7 @@ ReconstructionReport reconstructWithOpinion(const SampleSource& source, const Dr
     requireMemory(source.path(), imageBytes(picture, planes), "another denoiser's image beside the means");
 
     Steps steps{progress, 0, outline.data.height};
-    for (const Band& band : judgedBands(picture.height))
-        steps.all += (opinion.halves ? 2 : 1) * picture.height / std::max(1, band.count);
+    for (const Window& tile : judgedTiles(picture)) steps.all += (opinion.halves ? 2 : 1) * tile.height;
     SecondOpinionReport report;
     std::vector<float> certain;
     {
