@@ -102,19 +102,28 @@ void tell(const vlx::SampleSource& source, const std::string& original, const vl
     vlx::say(text);
 }
 
+constexpr const char* kAssessment = "variolux:assessment";
+constexpr const char* kAssessmentJson = "variolux:assessmentJson";
+
+// What was asked for, as the map keeps it.
+void printAssessment(const vlx::KrigeOptions& o) {
+    if (o.json)
+        std::printf("%s\n", vlx::readTextAttribute(o.image, kAssessmentJson).c_str());
+    else
+        std::printf("%s: %s", o.opinion.assessed.c_str(),
+                    vlx::readTextAttribute(o.image, kAssessment).c_str());
+}
+
 void assessed(const vlx::KrigeOptions& o, const vlx::SampleSource& samples, const vlx::Drift& method,
               const vlx::Fingerprint& made, const vlx::ImageWriteOptions& write,
               const vlx::Progress& progress) {
     const vlx::Assessment of = vlx::assess(samples, method, progress);
     made.checkUnchanged();
-    vlx::writeImage(o.image, of.map, write);
-    if (o.json) {
-        std::printf("%s\n", vlx::toJson(of.report).c_str());
-    } else {
-        std::string text = vlx::toText(of.report);
-        text.pop_back();
-        vlx::say(o.opinion.assessed + ": " + text);
-    }
+    vlx::ImageWriteOptions said = write;  // for runs that find it finished
+    said.attributes[kAssessment] = vlx::toText(of.report);
+    said.attributes[kAssessmentJson] = vlx::toJson(of.report);
+    vlx::writeImage(o.image, of.map, said);
+    printAssessment(o);
 }
 
 void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
@@ -147,7 +156,10 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     if (!o.samplingMap.empty()) outputs.push_back(o.samplingMap);
     if (o.diagnostics) outputs.push_back(diagnosticsName);
     if (!o.overwrite && vlx::isFinished(outputs, inputs)) {
-        if (o.json) std::printf("{\"skipped\": true}\n");
+        if (o.opinion.assesses())
+            printAssessment(o);
+        else if (o.json)
+            std::printf("{\"skipped\": true}\n");
         return;
     }
     for (const std::string& output : outputs)

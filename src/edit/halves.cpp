@@ -167,6 +167,9 @@ std::uint64_t writeHalfDump(const std::string& dump, const std::string& output, 
         writer.write(std::move(band));
         if (progress) progress(row + count, window.height);
     }
+    if (kept == 0)
+        throw Error(dump, "expected samples of " + std::string(parity == 0 ? "even" : "odd") +
+                              " number, two a pixel or more, found none");
     writer.close(renderSeconds / 2);
     return kept;
 }

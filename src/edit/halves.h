@@ -34,7 +34,7 @@ HalvesReport writeHalves(const std::string& dump, const std::string& prefix, con
 /// and
 /// 3. Windows, channels and attributes stay; variolux:samples and variolux:renderSeconds become their share.
 /// `inputs` is for the header's kInputsAttribute. Returns the number of samples. Works by bands of rows.
-/// Throws Error as DumpReader and DumpWriter.
+/// Throws Error as DumpReader and DumpWriter, and where there are no such samples.
 std::uint64_t writeHalfDump(const std::string& dump, const std::string& output, int parity,
                             DumpCompression compression = DumpCompression::Rle,
                             const std::string& inputs = {}, const Progress& progress = {});

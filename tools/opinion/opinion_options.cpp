@@ -100,16 +100,18 @@ void OpinionOptions::bind(CLI::App& app) {
     auto* judged =
         app.add_option("--assess", assessed,
                        "krige: judge this image, which another denoiser made of the same samples, without a "
-                       "reference: OUTPUT gets its error map instead (layers stddev; bias, where it is "
-                       "significant; confidence, the chance that what samples differ by from it is noise), "
-                       "and its relMSE is printed with a 95 % interval")
+                       "reference: its relMSE is printed with a 95 % interval, and OUTPUT gets its error map "
+                       "instead of an image (layers stddev; bias, what it is too bright by within 7 to 15 "
+                       "pixels, where that is significant; confidence, the chance that what samples around "
+                       "show is noise: below 0.001 they refute it). Without --assess-halves none is found "
+                       "better than the kriging")
             ->option_text("IMAGE[:LAYER]")
             ->check(filled)
             ->excludes(given)
             ->excludes("--denoiser");
     app.add_option("--assess-halves", assessedHalves,
-                   "Its images of the samples of even and of odd number alone, as for --denoised-halves: a "
-                   "narrower interval, without assumptions")
+                   "Its images of the samples of even and of odd number alone, as for --denoised-halves: how "
+                   "far it is better than the kriging, and a narrower interval")
         ->option_text("EVEN,ODD")
         ->check(filled)
         ->needs(judged);

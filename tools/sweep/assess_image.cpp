@@ -54,13 +54,17 @@ std::map<std::string, double> assessedErrors(const SweepPlan& plan, const std::s
     };
     ProcessRun run = assess(whole ? " --assess-halves " + shellQuoted(halves) : "");
     if (run.exitCode != 0 && whole) run = assess("");
-    if (run.exitCode != 0) throw Error("", "expected vlx-krige --assess to judge it: " + run.err);
+    if (run.exitCode != 0) {
+        while (run.err.ends_with('\n')) run.err.pop_back();
+        throw Error("", "vlx-krige --assess cannot judge its image: " + run.err);
+    }
     const auto report = reportOf(run, "vlx-krige --assess");
     const PredictedError predicted =
         predictedError(colourOf(readImage(image), image), colourOf(readImage(map), map, kStddev), image);
     return {{"predicted_relmse", report.at("relMse")},
             {"assessed_low", report.at("low")},
             {"assessed_high", report.at("high")},
+            {"assessed_by_halves", report.at("validated").get<bool>() ? 1 : 0},
             {"predicted_rmse", predicted.rmse}};
 }
 

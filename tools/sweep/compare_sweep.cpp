@@ -217,7 +217,9 @@ struct SweepCommand {
             }
         for (std::size_t i = 0; i < wanted.size(); ++i)
             if (options.reference.empty() && !wanted[i].measure.starts_with("predicted_"))
-                throw CLI::ValidationError("--target", "'" + wanted[i].measure + "' needs a --reference");
+                throw CLI::ValidationError("--target", "'" + wanted[i].measure +
+                                                           "' needs a --reference; without one there are "
+                                                           "predicted_relmse and predicted_rmse");
         const bool dump = std::filesystem::path(options.input).extension() == ".exr";
         if (dump && (!options.tolerances.empty() || options.width > 0 || options.height > 0 ||
                      !options.traceArguments.empty()))

@@ -125,7 +125,8 @@ class Runner {
         for (const Task& task : tasks) {
             const SweepRecord* before = done(task.record);
             if (before) ++sweep_.reused;
-            const SweepRecord record = before ? *before : makeImage(task, dump);
+            SweepRecord record = before ? *before : makeImage(task, dump);
+            record.method = task.record.method;  // the same command may have another name now
             announce(record.method, sampling, seed, record, before != nullptr);
             sweep_.records.push_back(record);
             if (inspects(task) && record.failure.empty()) inspect(task, record, dump);
@@ -251,6 +252,10 @@ class Runner {
             } else if (!plan_.reference) {
                 const std::string command = plan_.methodCommand(*task.method, record.sampling, record.seed);
                 record.values.merge(assessedErrors(plan_, command, dump, path, scratch() + "/" + record.key));
+                if (record.values.at("assessed_by_halves") == 0)
+                    say(record.method + ", " + samplingText(record.sampling) +
+                        ": its images of half the samples failed or do not fit; its error is less well "
+                        "known");
             }
         } catch (const Error& error) {
             record.failure = error.what();

@@ -14,14 +14,18 @@ struct AssessmentReport {
     /// pictures too small for a standard error).
     double byMap = 0, byMapError = 0;
     double byHalves = 0, byHalvesError = 0;
-    double biased = 0;   ///< share of pixels with a significant bias
-    double refuted = 0;  ///< share of pixels with a confidence below 0.001
+    bool validated = false;  ///< by images of halves: byMap knows how much nearer to the samples the image is
+    std::string refused;     ///< why images of halves that were there were not used; else empty
+    double biased = 0;       ///< share of pixels with a significant bias
+    double refuted = 0;      ///< share of pixels with a confidence below 0.001
 };
 
 struct Assessment {
     /// stddev.R, .G, .B: standard deviation of the image's error, bias included; bias.R, .G, .B: what it is
-    /// too bright by where that is significant, else 0; confidence: the probability that noise alone makes
-    /// the samples around the pixel differ from the image as much as they do.
+    /// too bright by (negative: too dark) within 7 or 15 pixels, where that is significant, else 0;
+    /// confidence: the probability that noise alone makes the samples within up to 15 pixels differ from the
+    /// image as much as they do, and at most 1 / t^2 where it lies t standard deviations from the combination
+    /// (Chebyshev).
     Image map;
     AssessmentReport report;
     ReconstructionReport kriging;  ///< of the combination that it rests on

@@ -31,6 +31,7 @@ struct SecondOpinionReport {
     double weight = 0;       ///< of the kriging, where nothing speaks against the other image
     double yielded = 0;      ///< share of pixels where something does: the kriging weighs more
     double limited = 0;      ///< share of pixels kept within kOpinionDeviations of the kriging
+    std::string refused;     ///< why images of halves that were there were not used; else empty
 };
 
 /// An estimate is moved by at most as many of its standard deviations.

@@ -43,6 +43,7 @@ nlohmann::ordered_json json(const DriftReport& report) {
         {"seconds", report.seconds}};
     if (const auto& of = report.secondOpinion)
         document["secondOpinion"] = {{"validated", of->validated},
+                                     {"refused", of->refused},
                                      {"weight", of->weight},
                                      {"yielded", of->yielded},
                                      {"limited", of->limited}};
@@ -182,9 +183,10 @@ std::string inWords(const DriftReport& report) {
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
     if (const auto& of = report.secondOpinion)
         text << "the kriging weighs " << 100 * of->weight << " %, the other image the rest ("
-             << (of->validated ? "validated on samples that neither had seen"
-                               : "not validated: images of halves of the samples, made as the whole one, "
-                                 "would tell more")
+             << (of->validated         ? "validated on samples that neither had seen"
+                 : of->refused.empty() ? "not validated: images of halves of the samples, made as the whole "
+                                         "one, would tell more"
+                                       : "WARNING: the images of halves were not used: " + of->refused)
              << "); in " << 100 * of->yielded << " % of the pixels samples speak against the other image, in "
              << 100 * of->limited << " % its pull is limited to " << kOpinionDeviations
              << " standard deviations\n";

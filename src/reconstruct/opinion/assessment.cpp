@@ -21,9 +21,12 @@ constexpr int kBlock = 16;               // pixels along an axis: what errors ha
 constexpr double kFewestBlocks = 4;
 // Standard error, relative, of the mean squared error that an error map predicts, with a validated weight
 // and without: testdata/results/second_opinion.md.
-constexpr double kMapError = 0.4, kUnvalidatedError = 0.6;
-constexpr double kUnitError = 0.05;  // relative: the unit 1 / (truth^2 + 0.01) is known by samples, too
-constexpr double kInterval = 1.96;   // standard errors of 95 %
+constexpr double kMapError = 0.4, kUnvalidatedError = 0.8;
+// Of u(y) = 1 / (y^2 + s^2 + 0.01) against the mean of u(truth), by the second derivative: about as many s^2
+// u^2.
+constexpr double kUnitBias = 3;
+constexpr double kLeastError = 0.05;  // relative: of all that is not accounted for
+constexpr double kInterval = 1.96;    // standard errors of 95 %
 constexpr float kRefuted = 1e-3f;
 
 /// An estimate of a mean and its standard error; NaN where there is none.
@@ -101,8 +104,9 @@ Assessment assess(const SampleSource& source, const Drift& options, const Progre
         Image(picture, {"stddev.R", "stddev.G", "stddev.B", "bias.R", "bias.G", "bias.B", "confidence"});
     result.map.display = source.header().display;
     const std::size_t pixels = static_cast<std::size_t>(picture.pixels());
-    std::vector<float> unit[3];
+    std::vector<float> unit[3], likely(pixels, 1.f);
     for (auto& plane : unit) plane.resize(pixels);
+    double own = 0, unitError = 0;
     AssessmentReport& report = result.report;
     for (std::size_t p = 0; p < pixels; ++p)
         for (std::size_t c = 0; c < 3; ++c) {
@@ -112,10 +116,16 @@ Assessment assess(const SampleSource& source, const Drift& options, const Progre
             unit[c][p] = static_cast<float>(u);
             result.map.pixels[7 * p + c] = static_cast<float>(error);
             report.byMap += u * error / (3 * static_cast<double>(pixels));
+            own += u * s * s / (3 * static_cast<double>(pixels));
+            unitError += kUnitBias * u * error * u * s * s / (3 * static_cast<double>(pixels));
+            likely[p] =
+                std::min(likely[p], static_cast<float>(s * s / std::max(apart * apart, s * s + 1e-300)));
         }
-    const bool validated = result.kriging.drift().secondOpinion->validated;
-    report.byMapError = (validated ? kMapError : kUnvalidatedError) * report.byMap;
-    const Estimate halves = validated ? estimateByHalves(source, opinion, unit) : Estimate{};
+    report.validated = result.kriging.drift().secondOpinion->validated;
+    report.refused = result.kriging.drift().secondOpinion->refused;
+    // Of (D - y)^2 + s^2 + 2 (D - y) (y - truth), whose mean is the first two, only the first is known.
+    report.byMapError = (report.validated ? kMapError : kUnvalidatedError) * std::sqrt(own * report.byMap);
+    const Estimate halves = report.validated ? estimateByHalves(source, opinion, unit) : Estimate{};
     report.byHalves = halves.value;
     report.byHalvesError = halves.error;
     double precision = 1 / (report.byMapError * report.byMapError), sum = report.byMap * precision;
@@ -130,7 +140,8 @@ Assessment assess(const SampleSource& source, const Drift& options, const Progre
                                                       : 0;
         const double both = std::max(1.0, contradiction) / std::sqrt(precision);
         report.relMse = std::max(sum / precision, both / kInterval);
-        const double deviation = std::hypot(both, kUnitError * report.relMse);
+        const double deviation =
+            std::hypot(both, unitError / report.byMap * report.relMse, kLeastError * report.relMse);
         const double factor = std::exp(kInterval * deviation / report.relMse);
         report.low = report.relMse / factor;
         report.high = report.relMse * factor;
@@ -145,7 +156,7 @@ Assessment assess(const SampleSource& source, const Drift& options, const Progre
             out[c] = static_cast<float>(std::sqrt(scale * static_cast<double>(out[c])));
             out[3 + c] = doubts.bias[c][p];
         }
-        out[6] = doubts.confidence[p];
+        out[6] = std::min(doubts.confidence[p], likely[p]);
         report.biased += (out[3] != 0 || out[4] != 0 || out[5] != 0) / static_cast<double>(pixels);
         report.refuted += (out[6] < kRefuted) / static_cast<double>(pixels);
     }
@@ -160,7 +171,13 @@ std::string toText(const AssessmentReport& of) {
                 formatted(" +- %.2g, ", of.byHalvesError) + formatted("the kriging %.3g", of.byMap) +
                 formatted(" +- %.2g\n", of.byMapError);
     else
-        text += "by what it differs from the kriging, without images of halves\n";
+        text += "by what it differs from the kriging\n";
+    if (!of.refused.empty()) text += "WARNING: the images of halves were not used: " + of.refused + "\n";
+    if (of.byHalvesError > 0 &&
+        std::abs(of.byHalves - of.byMap) > 2 * std::hypot(of.byHalvesError, of.byMapError))
+        text +=
+            "WARNING: the two contradict each other: are these one denoiser's images of the whole and of "
+            "both halves?\n";
     text += formatted("significantly biased in %.3g %% of the pixels, ", 100 * of.biased) +
             formatted("refuted by the samples (confidence below 0.001) in %.3g %%\n", 100 * of.refuted);
     return text;
@@ -177,6 +194,8 @@ std::string toJson(const AssessmentReport& of) {
                                   {"byMapError", of.byMapError},
                                   {"byHalves", orNull(of.byHalves)},
                                   {"byHalvesError", orNull(of.byHalvesError)},
+                                  {"validated", of.validated},
+                                  {"refused", of.refused},
                                   {"biased", of.biased},
                                   {"refuted", of.refuted}}
         .dump();

@@ -99,8 +99,9 @@ double relativeUnit(const SampleMeans& samples, std::size_t pixel, const float* 
 /// Sums over the tiles that halves are judged in.
 struct HalvesSums {
     double follow = 0, follow2 = 0;  ///< sum of (D_A - D_B) (z_A - z_B), and of its square
-    double whole = 0, between = 0;   ///< of the squared distance of D from their mean, and of D_A from D_B
-    double product = 0, square = 0;  ///< of (z - D) (K - D) and of (K - D)^2
+    double whole = 0, between = 0;   ///< of the squared distance of D from their mean M, and of D_A from D_B
+    double left = 0, leftOfHalves = 0;  ///< of (D - z)^2 and of (M - z)^2
+    double product = 0, square = 0;     ///< of (z - D) (K - D) and of (K - D)^2
     std::int64_t judged = 0;
 };
 
@@ -123,6 +124,9 @@ void compareHalves(const SecondOpinion& opinion, const SampleMeans* ofHalf, cons
                 follow += u * (a - b) * static_cast<double>(ofHalf[0].mean[c][p] - ofHalf[1].mean[c][p]);
                 sums.whole += u * (d - (a + b) / 2) * (d - (a + b) / 2);
                 sums.between += u * (a - b) * (a - b);
+                const double z = static_cast<double>(ofHalf[0].mean[c][p] + ofHalf[1].mean[c][p]) / 2;
+                sums.left += u * (d - z) * (d - z);
+                sums.leftOfHalves += u * ((a + b) / 2 - z) * ((a + b) / 2 - z);
             }
             sums.follow += follow;
             sums.follow2 += follow * follow;
@@ -133,16 +137,38 @@ void compareHalves(const SecondOpinion& opinion, const SampleMeans* ofHalf, cons
 /// negative, beyond three standard errors.
 void requireOwnHalves(const std::string& name, const HalvesSums& sums) {
     if (sums.follow < -3 * std::sqrt(sums.follow2))
-        throw Error(name,
-                    "expected --denoised-halves EVEN,ODD, found images that follow each the other half's "
-                    "samples: are they exchanged, or halves of another kind?");
+        throw Error(
+            name,
+            "expected images of the even and of the odd samples, EVEN,ODD, that follow their own, found "
+            "images that follow each the other half's: are they exchanged, or is one of another kind?");
 }
 
 /// The weight w of the kriging K, of halves, in K w + D (1 - w) that predicts the other half's means z best:
 ///     w = (sum u (z - D) (K - D) + l / 2) / (sum u (K - D)^2 + l),   u = 1 / (v + 1e-3 K^2).
-/// Nothing where no pixel has samples of both halves, or where the whole image is not of the halves' kind: it
-/// differs from their mean by more than they from each other.
-std::optional<double> validatedWeight(const SampleSource& source, const Drift& options, Steps& steps) {
+/// Nothing, and why, where no pixel has samples of both halves, or where the whole image is not of the
+/// halves' kind (whyRefused).
+struct ValidatedWeight {
+    std::optional<double> weight;
+    std::string refused;
+};
+
+/// One denoiser's image differs from the mean of its halves' by less than they from each other, and leaves as
+/// much of the samples' noise as they do (0.96 to 1 times in testdata/results/rivals.md's cases).
+std::string whyRefused(const HalvesSums& sums) {
+    constexpr double kMostOfLeft = 1.5;
+    const double rounding = 0.01 * sums.between;  // of plain averages nothing is left
+    if (sums.judged == 0) return "no pixel has samples of both halves";
+    if (sums.between == 0) return "both are the same image";
+    if (sums.whole > sums.between)
+        return "the whole image differs from their mean more than they from each other";
+    if (sums.leftOfHalves > kMostOfLeft * sums.left + rounding)
+        return "the whole image follows the samples more closely";
+    if (sums.left > kMostOfLeft * sums.leftOfHalves + rounding)
+        return "they follow the samples more closely than the whole image: were they denoised?";
+    return {};
+}
+
+ValidatedWeight validatedWeight(const SampleSource& source, const Drift& options, Steps& steps) {
     const SecondOpinion& opinion = *options.secondOpinion;
     const Window& picture = source.header().data;
     const bool replicates = hasReplicates(source);
@@ -170,8 +196,9 @@ std::optional<double> validatedWeight(const SampleSource& source, const Drift& o
             });
         }
     }
-    if (sums.judged == 0 || sums.between == 0 || sums.whole > sums.between) return std::nullopt;
-    return std::clamp((sums.product + kPriorData * kEqualWeights) / (sums.square + kPriorData), 0.0, 1.0);
+    if (const std::string why = whyRefused(sums); !why.empty()) return {std::nullopt, why};
+    return {std::clamp((sums.product + kPriorData * kEqualWeights) / (sums.square + kPriorData), 0.0, 1.0),
+            {}};
 }
 
 /// The sum of all but the largest kTrimmed of them: places tell of themselves only, and only many of them of
@@ -334,10 +361,12 @@ ReconstructionReport reconstructWithOpinion(const SampleSource& source, const Dr
     {
         const SampleMeans samples = sampleMeans(source);
         certain = certainError(samples, opinion.image);
-        std::optional<double> weight;
-        if (opinion.halves) weight = validatedWeight(source, options, steps);
-        report.validated = weight.has_value();
-        report.weight = weight ? *weight : certainWeight(source, options, samples, certain, steps);
+        ValidatedWeight found;
+        if (opinion.halves) found = validatedWeight(source, options, steps);
+        report.refused = found.refused;
+        report.validated = found.weight.has_value();
+        report.weight =
+            found.weight ? *found.weight : certainWeight(source, options, samples, certain, steps);
         steps.all = steps.before + outline.data.height;  // halves may not have been judged
     }
     Combiner combiner(opinion.image, certain, report.weight, report.validated, picture.width,
