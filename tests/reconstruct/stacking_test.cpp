@@ -58,12 +58,12 @@ PatchTile noisyTile(float v, float step) {
     std::mt19937 random(11);
     std::normal_distribution<float> normal;
     PatchTile tile;
-    tile.channels = 3;
-    tile.value.resize(3 * kTileSide * kTileSide);
+    tile.resize(3);
     tile.variance.assign(tile.value.size(), v);
     for (std::size_t i = 0; i < tile.value.size(); ++i)
         tile.value[i] = 1 + std::sqrt(v) * normal(random) +
                         (static_cast<int>(i) % kTileSide >= kTileMargin + kTile / 2 ? step : 0);
+    tile.setScale(0);
     return tile;
 }
 
@@ -73,7 +73,7 @@ TEST(PatchDistances, NoiseAloneIsNoDistance) {
     double sum = 0;
     int count = 0;
     for (const int d : {-15, -8, 7, 15}) {
-        patchDistances(tile, d, -d, 0, scratch, out.data());
+        patchDistances(tile, d, -d, scratch, out.data());
         for (const float of : out) sum += static_cast<double>(of);
         count += kTile * kTile;
     }
@@ -85,13 +85,31 @@ TEST(PatchDistances, NoiseAloneIsNoDistance) {
 TEST(PatchDistances, AreSquaredDifferencesInUnitsOfTheirNoise) {
     const PatchTile tile = noisyTile(1e-6f, 0.01f);
     std::vector<float> scratch, out(kTile * kTile);
-    patchDistances(tile, 15, 0, 0, scratch, out.data());
+    patchDistances(tile, 15, 0, scratch, out.data());
     // Left of the step by more than a patch, but not 15 pixels: 0.01^2 / (2e-6) = 50, but for the relative
     // floor of 1e-6 (1 + 1).
     EXPECT_NEAR(out[5 * kTile + 8], 25, 4);
     EXPECT_NEAR(out[5 * kTile + 28], 0, 1);
-    patchDistances(tile, 0, 15, 0, scratch, out.data());
+    patchDistances(tile, 0, 15, scratch, out.data());
     EXPECT_NEAR(out[5 * kTile + 8], 0, 1);
+}
+
+TEST(PatchDistances, FromOnePixelAreThoseOfAll) {
+    PatchTile tile = noisyTile(0.04f, 0.5f);
+    for (std::size_t i = 0; i < tile.variance.size(); ++i)
+        tile.variance[i] *= 1 + 0.1f * static_cast<float>(i % 7);
+    tile.setScale(1e-3f);
+    std::vector<float> scratch, all(kTile * kTile), one((2 * kMaxReach + 1) * kDistanceStride);
+    for (const auto& [column, row] : {std::pair{0, 0}, {31, 31}, {13, 20}}) {
+        patchDistancesFrom(tile, column, row, one.data());
+        for (const auto& [dx, dy] : {std::pair{0, 0}, {-15, -15}, {15, 15}, {15, -15}, {-7, 3}}) {
+            patchDistances(tile, dx, dy, scratch, all.data());
+            const float d = all[static_cast<std::size_t>(row * kTile + column)];
+            EXPECT_NEAR(one[static_cast<std::size_t>((dy + kMaxReach) * kDistanceStride + dx + kMaxReach)], d,
+                        1e-5f * (1 + std::abs(d)))
+                << column << " " << row << " " << dx << " " << dy;
+        }
+    }
 }
 
 }  // namespace

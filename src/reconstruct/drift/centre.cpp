@@ -12,8 +12,6 @@ namespace {
 
 constexpr double kLeastFeatureSpread = 1e-8;  // squared: less is a constant
 constexpr double kLeastPositionSpread = 1e-12;
-constexpr float kMostCountRatio = 4;       // a datum counts at most as many samples as four of the centre's
-constexpr float kLeastCountRatio = 1e-3f;  // and as many to predict as this many: no datum, but a place
 constexpr int kPriorIterations = 4;
 
 constexpr double kWildVariances = 9;  // beyond three standard deviations a value may be wild
@@ -76,40 +74,18 @@ void Centre::begin(const TilePlanes& tile, int at, int reach) {
     stride_ = lanesUp((2 * reach + 1) * (2 * reach + 1));
     const int most = 1 + kPositionFunctions + tile.featureCount + tile.radiance + kBlockRows;
     rows_.resize(static_cast<std::size_t>(most * stride_));
-    index_.clear();
-    weights_.clear();
-    predicted_.clear();
+    index_.resize(static_cast<std::size_t>(stride_));
+    for (auto* of : {&weights_, &predicted_}) of->resize(static_cast<std::size_t>(stride_));
+    count_ = 0;
+    own_ = std::max(1.f, tile.counts[centre_]);
     gaps_ = false;
     noise_ = total_ = 0;
-}
-
-void Centre::add(int dx, int dy, float alike) {
-    const int at = static_cast<int>(centre_) + dy * kTileSide + dx;
-    const auto place = static_cast<std::size_t>(at);
-    const float own = std::max(1.f, tile_.counts[centre_]);
-    const float ratio = std::clamp(tile_.counts[place] / own, kLeastCountRatio, kMostCountRatio);
-    const bool datum = tile_.counts[place] > 0;
-    float* p = row(1) + index_.size();
-    index_.push_back(at);
-    weights_.push_back(datum ? alike * ratio : 0.f);
-    predicted_.push_back(alike * ratio);
-    const float perReach = 1.f / static_cast<float>(reach_);
-    const float px = static_cast<float>(dx) * perReach, py = static_cast<float>(dy) * perReach;
-    p[0] = px;
-    p[stride_] = py;
-    p[2 * stride_] = px * px;
-    p[3 * stride_] = py * py;
-    p[4 * stride_] = px * py;
-    gaps_ = gaps_ || !datum;
-    if (!datum) return;
-    noise_ += static_cast<double>(alike * ratio) * tile_.errors[place] * ratio;
-    total_ += static_cast<double>(alike * ratio);
 }
 
 void Centre::krige(float* sums, NeighbourhoodCounts& counts) {
     if (total_ <= 0) return;
     ++counts.neighbourhoods;
-    weights_.resize(static_cast<std::size_t>(lanesUp(size())), 0.f);
+    std::fill(weights_.begin() + count_, weights_.begin() + lanesUp(count_), 0.f);
     stackFunctions();
     stackRadiance();
     weighted_.resize(rows_.size());

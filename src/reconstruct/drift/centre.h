@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -12,6 +13,10 @@ namespace vlx {
 inline constexpr int kPositionFunctions = 5;   ///< x, y, x^2, y^2, xy
 inline constexpr float kFarthest = 3.6f;       ///< composite distance: data farther away weigh nothing
 inline constexpr float kLeastSquare = 1e-30f;  ///< of radiance, or of its noise
+inline constexpr float kMostCountRatio =
+    4;  ///< a datum counts at most as many samples as four of the centre's
+inline constexpr float kLeastCountRatio =
+    1e-3f;  ///< and as many to predict as this many: no datum, but a place
 inline constexpr float kFeatureWidth2 =
     0.04f;  ///< (a fifth of a feature's scale)^2: as unlike as noise of one
 
@@ -40,7 +45,7 @@ class Centre {
     void krige(float* sums, NeighbourhoodCounts& counts);
 
   private:
-    int size() const { return static_cast<int>(index_.size()); }
+    int size() const { return count_; }
     float* row(int r) { return rows_.data() + r * stride_; }
     double gram(int a, int b) const {
         return gram_[static_cast<std::size_t>(a >= b ? a * gramRows_ + b : b * gramRows_ + a)];
@@ -58,6 +63,8 @@ class Centre {
     TilePlanes tile_;
     std::size_t centre_ = 0;
     int reach_ = 0, stride_ = 0;
+    float own_ = 1;                           // samples of the centre, one at least
+    int count_ = 0;                           // of data, and pixels to be predicted
     std::vector<int> index_;                  // of the data, in a plane
     std::vector<float> weights_, predicted_;  // of the data; of what is predicted there
     bool gaps_ = false;                       // pixels without data are among them
@@ -75,5 +82,28 @@ class Centre {
     std::vector<int> used_, group_;  // rows that are drift functions: those that are not constant
     std::array<double, kMaxRandomDrift> unit_{};  // one over the standard deviation of each
 };
+
+inline void Centre::add(int dx, int dy, float alike) {
+    const int at = static_cast<int>(centre_) + dy * kTileSide + dx;
+    const auto place = static_cast<std::size_t>(at), next = static_cast<std::size_t>(count_++);
+    const float ratio = std::clamp(tile_.counts[place] / own_, kLeastCountRatio, kMostCountRatio);
+    const float weight = alike * ratio;
+    const bool datum = tile_.counts[place] > 0;
+    index_[next] = at;
+    weights_[next] = datum ? weight : 0.f;
+    predicted_[next] = weight;
+    const float perReach = 1.f / static_cast<float>(reach_);
+    const float px = static_cast<float>(dx) * perReach, py = static_cast<float>(dy) * perReach;
+    float* p = row(1) + next;
+    p[0] = px;
+    p[stride_] = py;
+    p[2 * stride_] = px * px;
+    p[3 * stride_] = py * py;
+    p[4 * stride_] = px * py;
+    gaps_ = gaps_ || !datum;
+    if (!datum) return;
+    noise_ += static_cast<double>(weight) * tile_.errors[place] * ratio;
+    total_ += static_cast<double>(weight);
+}
 
 }  // namespace vlx

@@ -1,6 +1,7 @@
 #include "reconstruct/drift/neighbourhoods.h"
 
 #include <algorithm>
+#include <array>
 
 #include "base/simd.h"
 #include "reconstruct/drift/centre.h"
@@ -9,6 +10,9 @@ namespace vlx {
 
 namespace {
 
+// Distances up to here are computed for all pixels at once, farther ones for the few centres that need them.
+constexpr int kNearReach = 8;
+constexpr std::size_t kNearOffsets = (2 * kNearReach + 1) * (2 * kNearReach + 1);
 constexpr float kLeastWeight = 0.01f;      // of a datum: nearExp(kFarthest)
 constexpr float kCoveringWeight = 0.2f;    // a pixel less like its regular centres gets its own
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
@@ -17,11 +21,10 @@ constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier tha
 class Tile {
   public:
     /// Takes a tile up; what it needs of memory is kept for the next.
-    void load(const TileInput& input, int x, int y, int reach) {
+    void load(const TileInput& input, int x, int y) {
         in_ = input;
         x_ = x;
         y_ = y;
-        reach_ = reach;
         const int c = input.planes.radiance;
         for (int half = 0; half < 2; ++half) {
             means_[half].resize(plane(c));
@@ -30,9 +33,7 @@ class Tile {
             PatchTile& guide = guides_[half];
             guide.x = x;
             guide.y = y;
-            guide.channels = 3;
-            guide.value.resize(plane(3));
-            guide.variance.resize(plane(3));
+            guide.resize(3);
             for (int k = 0; k < c; ++k)
                 copy(*input.data, input.planes.mean(half) + k, means_[half].data() + plane(k));
             copy(*input.data, input.planes.halfCount(half), counts_[half].data());
@@ -45,6 +46,7 @@ class Tile {
                     guide.variances(k)[i] /= n;
                 }
             }
+            guide.setScale(kLeastSquare);
         }
         references_.resize(plane(c));
         for (std::size_t i = 0; i < references_.size(); ++i)
@@ -54,11 +56,11 @@ class Tile {
             copy(*input.features, f, features_.data() + plane(f));
 
         for (int half = 0; half < 2; ++half) {
-            distances_[half].resize(offsets() * kTile * kTile);
-            for (int dy = -reach; dy <= reach; ++dy)
-                for (int dx = -reach; dx <= reach; ++dx)
-                    patchDistances(guides_[half], dx, dy, kLeastSquare, scratch_,
-                                   distances_[half].data() + offset(dx, dy) * kTile, offsets() * kTile);
+            distances_[half].resize(kNearOffsets * kTile * kTile);
+            for (int dy = -kNearReach; dy <= kNearReach; ++dy)
+                for (int dx = -kNearReach; dx <= kNearReach; ++dx)
+                    patchDistances(guides_[half], dx, dy, scratch_,
+                                   distances_[half].data() + offset(dx, dy) * kTile, kNearOffsets * kTile);
         }
     }
 
@@ -68,11 +70,15 @@ class Tile {
         const int right = std::min(kTile, in_.width - x_), bottom = std::min(kTile, in_.height - y_);
         for (int half = 0; half < 2; ++half) {
             sums_.assign(plane(out.perHalf()), 0.f);
+            own_.assign(kTile * kTile, 0);
             for (int row = 0; row < bottom; ++row)
                 for (int col = 0; col < right; ++col) {
                     const bool regular = (x_ + col) % model.stride == 0 && (y_ + row) % model.stride == 0;
-                    if (!regular && covered(model, half, col, row)) continue;
-                    counts.own += !regular;
+                    if (!regular) {
+                        if (covered(model, half, col, row)) continue;
+                        own_[static_cast<std::size_t>(row * kTile + col)] = 1;
+                        ++counts.own;
+                    }
                     krigeCentre(model, half, col, row, counts);
                 }
             flush(half, model.reach, out, estimates);
@@ -83,27 +89,23 @@ class Tile {
   private:
     static std::size_t plane(int k) { return TilePlanes::plane(k); }
     static int inner(int col, int row) { return (row + kTileMargin) * kTileSide + col + kTileMargin; }
-    std::size_t offsets() const { return static_cast<std::size_t>((2 * reach_ + 1) * (2 * reach_ + 1)); }
-    std::size_t offset(int dx, int dy) const {
-        return static_cast<std::size_t>((dy + reach_) * (2 * reach_ + 1) + dx + reach_);
+    static std::size_t offset(int dx, int dy) {
+        return static_cast<std::size_t>((dy + kNearReach) * (2 * kNearReach + 1) + dx + kNearReach);
     }
     void copy(const RowRing& ring, int k, float* out) const {
         copyTile(ring, k, x_, y_, in_.width, in_.height, out);
     }
-    float distance(int guide, int col, int row, int dx, int dy) const {
-        return distances_[guide][(static_cast<std::size_t>(row) * offsets() + offset(dx, dy)) * kTile +
+    float nearDistance(int guide, int col, int row, int dx, int dy) const {
+        return distances_[guide][(static_cast<std::size_t>(row) * kNearOffsets + offset(dx, dy)) * kTile +
                                  static_cast<std::size_t>(col)];
     }
 
     /// The composite distance of a datum from a centre at (col, row): colour patches of the other half and,
     /// where the model has them, features with their error variances.
-    float compositeDistance(const NeighbourhoodModel& model, int half, int col, int row, int dx,
-                            int dy) const {
-        const float patches = distance(1 - half, col, row, dx, dy) / (model.tolerance * model.tolerance);
-        float d = std::max(0.f, patches);
+    float compositeDistance(const NeighbourhoodModel& model, float patches, std::size_t here,
+                            std::size_t there) const {
+        float d = std::max(0.f, patches / (model.tolerance * model.tolerance));
         if (!model.features || d > kFarthest) return d;
-        const auto here = static_cast<std::size_t>(inner(col, row));
-        const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
         for (int f = 0; f < in_.featureCount; ++f) {
             const float* values = features_.data() + plane(f);
             const float* errors = features_.data() + plane(in_.featureCount + f);
@@ -113,18 +115,27 @@ class Tile {
         return d;
     }
 
-    /// Is the pixel like one of the regular centres around it, and not much less noisy?
+    /// Is the pixel like one of the regular centres around it, and not much less noisy? Or like one of the
+    /// tile's own centres so far; not of tolerant models, to which much is alike.
     bool covered(const NeighbourhoodModel& model, int half, int col, int row) const {
-        const int left = (x_ + col) % model.stride, up = (y_ + row) % model.stride;
         const auto here = static_cast<std::size_t>(inner(col, row));
+        const auto coveredFrom = [&](int dx, int dy) {
+            const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
+            const float patches = nearDistance(1 - half, col, row, dx, dy);
+            return simd::nearExp(compositeDistance(model, patches, here, there)) > kCoveringWeight &&
+                   errors_[half][here] >= kCoveringVariance * errors_[half][there];
+        };
+        const int left = (x_ + col) % model.stride, up = (y_ + row) % model.stride;
         for (const int dy : {-up, model.stride - up})
-            for (const int dx : {-left, model.stride - left}) {
-                if (x_ + col + dx >= in_.width || y_ + row + dy >= in_.height) continue;
-                const auto there = static_cast<std::size_t>(inner(col + dx, row + dy));
-                if (simd::nearExp(compositeDistance(model, half, col, row, dx, dy)) > kCoveringWeight &&
-                    errors_[half][here] >= kCoveringVariance * errors_[half][there])
+            for (const int dx : {-left, model.stride - left})
+                if (x_ + col + dx < in_.width && y_ + row + dy < in_.height && coveredFrom(dx, dy))
                     return true;
-            }
+        if (model.tolerance > 1) return false;
+        const int most = std::min(model.stride - 1, model.reach);
+        for (int dy = -std::min(most, row); dy <= 0; ++dy)
+            for (int dx = -std::min(most, col); dx <= std::min(most, kTile - 1 - col); ++dx)
+                if (own_[static_cast<std::size_t>((row + dy) * kTile + col + dx)] && coveredFrom(dx, dy))
+                    return true;
         return false;
     }
 
@@ -141,11 +152,19 @@ class Tile {
         planes.featureCount = in_.featureCount;
         planes.group = &in_.group;
         planes.groups = in_.groups;
-        centre_.begin(planes, inner(col, row), reach);
+        const int here = inner(col, row);
+        centre_.begin(planes, here, reach);
+        const bool far = reach > kNearReach;
+        if (far) patchDistancesFrom(guides_[1 - half], col, row, far_.data());
         for (int dy = std::max(-reach, -(y_ + row)); dy <= std::min(reach, in_.height - 1 - y_ - row); ++dy)
             for (int dx = std::max(-reach, -(x_ + col)); dx <= std::min(reach, in_.width - 1 - x_ - col);
                  ++dx) {
-                const float alike = simd::nearExp(compositeDistance(model, half, col, row, dx, dy));
+                const float patches =
+                    far ? far_[static_cast<std::size_t>((dy + kMaxReach) * kDistanceStride + dx + kMaxReach)]
+                        : nearDistance(1 - half, col, row, dx, dy);
+                const float alike =
+                    simd::nearExp(compositeDistance(model, patches, static_cast<std::size_t>(here),
+                                                    static_cast<std::size_t>(here + dy * kTileSide + dx)));
                 if (alike >= kLeastWeight) centre_.add(dx, dy, alike);
             }
         centre_.krige(sums_.data(), counts);
@@ -162,10 +181,12 @@ class Tile {
     }
 
     TileInput in_;
-    int x_ = 0, y_ = 0, reach_ = 0;
+    int x_ = 0, y_ = 0;
     PatchTile guides_[2];
     std::vector<float> means_[2], counts_[2], errors_[2], distances_[2], references_, features_, scratch_;
 
+    std::array<float, (2 * kMaxReach + 1) * kDistanceStride> far_;  // of a centre: patchDistancesFrom()
+    std::vector<char> own_;    // the pixels that have a centre of their own
     std::vector<float> sums_;  // EstimatePlanes of one half
     Centre centre_;
 };
@@ -174,10 +195,8 @@ class Tile {
 
 NeighbourhoodCounts krigeTile(const TileInput& input, const std::vector<NeighbourhoodModel>& models, int x,
                               int y, std::vector<RowRing>& estimates) {
-    int reach = 0;
-    for (const NeighbourhoodModel& model : models) reach = std::max(reach, model.reach);
     static thread_local Tile tile;  // megabytes: worth keeping
-    tile.load(input, x, y, reach);
+    tile.load(input, x, y);
     NeighbourhoodCounts counts;
     for (std::size_t m = 0; m < models.size(); ++m) {
         const NeighbourhoodCounts of = tile.krige(models[m], estimates[m]);

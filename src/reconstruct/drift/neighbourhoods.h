@@ -14,7 +14,7 @@ namespace vlx {
 struct NeighbourhoodModel {
     int reach = 8;          ///< pixels along each axis, at most kMaxReach
     float tolerance = 1;    ///< k of w = exp(-d / k^2)
-    int stride = 4;         ///< a centre every so many pixels, at most kMaxReach
+    int stride = 4;         ///< a centre every so many pixels, at most 8
     bool features = false;  ///< unlike features weigh a datum down as well
 };
 

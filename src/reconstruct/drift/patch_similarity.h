@@ -18,12 +18,18 @@ inline constexpr int kTileSide = kTile + 2 * kTileMargin;  ///< with the margin:
 struct PatchTile {
     int x = 0, y = 0;  ///< the tile's first pixel, without margin
     int channels = 0;
-    std::vector<float> value, variance;  ///< channels * kTileSide * kTileSide
+    /// channels * kTileSide * kTileSide each, and a vector's length to be read past. scale: of differences,
+    /// floor / 2 + 1e-6 z^2 + v: a thousandth of the value is no difference.
+    std::vector<float> value, variance, scale;
+
+    void resize(int count);
+    void setScale(float absoluteFloor);  ///< of what values and variances are
 
     float* values(int channel) { return value.data() + plane(channel); }
     float* variances(int channel) { return variance.data() + plane(channel); }
     const float* values(int channel) const { return value.data() + plane(channel); }
     const float* variances(int channel) const { return variance.data() + plane(channel); }
+    const float* scales(int channel) const { return scale.data() + plane(channel); }
 
   private:
     static std::size_t plane(int channel) {
@@ -35,10 +41,16 @@ struct PatchTile {
 void copyTile(const RowRing& ring, int plane, int x, int y, int width, int height, float* out);
 
 /// For each pixel p of the tile the distance to p + (dx, dy), |dx|, |dy| <= kMaxReach:
-///     d = mean over patch and channels of ((z1 - z2)^2 - (v1 + min(v1, v2))) / (floor + v1 + v2),
-/// floor = absoluteFloor + 1e-6 (z1^2 + z2^2): a thousandth of the value is no difference. May be negative.
-/// Row r of the tile goes to out + r * outStride. scratch: any.
-void patchDistances(const PatchTile& tile, int dx, int dy, float absoluteFloor, std::vector<float>& scratch,
-                    float* out, std::size_t outStride = kTile);
+///     d = mean over patch and channels of ((z1 - z2)^2 - (v1 + min(v1, v2))) / (scale1 + scale2).
+/// May be negative. Row r of the tile goes to out + r * outStride. scratch: any.
+void patchDistances(const PatchTile& tile, int dx, int dy, std::vector<float>& scratch, float* out,
+                    std::size_t outStride = kTile);
+
+/// Length of the rows that patchDistancesFrom() writes.
+inline constexpr int kDistanceStride = (2 * kMaxReach + 1 + 7) / 8 * 8;
+
+/// The same of one pixel of the tile, from its corner, to all up to kMaxReach from it: that to p + (dx, dy)
+/// is out[(dy + kMaxReach) * kDistanceStride + dx + kMaxReach].
+void patchDistancesFrom(const PatchTile& tile, int column, int row, float* out);
 
 }  // namespace vlx

@@ -42,10 +42,10 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality, bool coarse) {
         case Quality::Standard:
             break;
         case Quality::High:
-            return {{8, 0.8f, 2, true}, {15, 3.f, 3, false}, {4, 1.f, 2, false}};
+            return {{8, 0.8f, 2, true}, {15, 3.f, 6, false}, {4, 1.f, 2, false}};
     }
     if (coarse) return {{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}};
-    return {{8, 0.8f, 4, true}, {15, 3.f, 6, false}, {4, 1.f, 3, false}};
+    return {{8, 0.8f, 4, true}, {15, 3.f, 8, false}, {4, 1.f, 3, false}};
 }
 
 Window scaled(const Window& window, int scale) {

@@ -82,9 +82,7 @@ bool splitFeatures(const RowRing& raw, const FeaturePlanes& planes, int first, i
     std::vector<float> value(kTileSide * kTileSide), error(value.size()), difference(value.size());
     bool noisy = false;
     for (int h = 0; h < 2; ++h) {
-        halves[h].channels = channels;
-        halves[h].value.resize(static_cast<std::size_t>(channels) * value.size());
-        halves[h].variance.resize(halves[h].value.size());
+        halves[h].resize(channels);
     }
     for (int c = 0; c < channels; ++c) {
         const auto copy = [&](int plane, std::vector<float>& out) {
@@ -111,6 +109,7 @@ bool splitFeatures(const RowRing& raw, const FeaturePlanes& planes, int first, i
                 }
             }
     }
+    for (int h = 0; h < 2; ++h) halves[h].setScale(kFeatureFloor);
     return noisy;
 }
 
@@ -132,7 +131,11 @@ void prefilterFeatures(const RowRing& raw, const RowRing& data, const DataPlanes
     const int right = std::min(width, x + kTile), bottom = std::min(height, y + kTile);
     const FeaturePlanes planes{layout.features};
     const ResidualPlanes residual{layout.groups};
-    PatchTile halves[2] = {{x, y, 0, {}, {}}, {x, y, 0, {}, {}}};
+    PatchTile halves[2];
+    for (PatchTile& half : halves) {
+        half.x = x;
+        half.y = y;
+    }
     std::vector<float> counts(kTileSide * kTileSide), scratch, distances(kTile * kTile), weights(kTile);
     copyTile(data, dataPlanes.count(), x, y, width, height, counts.data());
     for (int first = 0; first < layout.features;) {
@@ -146,7 +149,7 @@ void prefilterFeatures(const RowRing& raw, const RowRing& data, const DataPlanes
         for (int dy = -kFeatureReach; noisy && dy <= kFeatureReach; ++dy)
             for (int dx = -kFeatureReach; dx <= kFeatureReach; ++dx)
                 for (int h = 0; h < 2; ++h) {
-                    patchDistances(halves[1 - h], dx, dy, kFeatureFloor, scratch, distances.data());
+                    patchDistances(halves[1 - h], dx, dy, scratch, distances.data());
                     for (int row = std::max(y, -dy); row < std::min(bottom, height - dy); ++row) {
                         const int begin = std::max(x, -dx), end = std::min(right, width - dx);
                         if (begin >= end) continue;

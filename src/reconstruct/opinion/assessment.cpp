@@ -21,7 +21,7 @@ constexpr int kBlock = 16;               // pixels along an axis: what errors ha
 constexpr double kFewestBlocks = 4;
 // Standard error, relative, of the mean squared error that an error map predicts, with a validated weight
 // and without: testdata/results/second_opinion.md.
-constexpr double kMapError = 0.4, kUnvalidatedError = 1;
+constexpr double kMapError = 0.5, kUnvalidatedError = 1;
 // Of u(y) = 1 / (y^2 + s^2 + 0.01) against the mean of u(truth), by the second derivative: about as many s^2
 // u^2.
 constexpr double kUnitBias = 3;
