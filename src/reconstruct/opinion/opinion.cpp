@@ -21,7 +21,7 @@ constexpr double kPriorData = 10;         // that speak for equal weights
 constexpr double kRelativeError = 1e-3;   // of a value squared: dark pixels are not all that counts
 constexpr float kMostValue = 0x1p50f;     // squares of it are finite floats
 constexpr double kTrimmed = 0.02;         // of the pixels
-constexpr int kTile = 256;                // pixels along an axis
+constexpr int kJudgedTile = 256;          // pixels along an axis
 constexpr double kJudgedShare = 1 / 8.0;  // of a picture of many tiles
 constexpr int kTileBorder = 12;           // pixels that have neighbours on one side only, as a picture's have
 constexpr int kApartReach = 4;            // pixels along a row
@@ -29,7 +29,7 @@ constexpr int kApartReach = 4;            // pixels along a row
 /// Where the weight is found: tiles spread over the picture, two at least, each a picture of its own; the
 /// whole of a picture of up to three tiles.
 std::vector<Window> judgedTiles(const Window& picture) {
-    const int width = std::min(kTile, picture.width), height = std::min(kTile, picture.height);
+    const int width = std::min(kJudgedTile, picture.width), height = std::min(kJudgedTile, picture.height);
     const double tiles = static_cast<double>(picture.pixels()) / (double{1} * width * height);
     if (tiles <= 3) return {picture};
     const int count = std::max(2, static_cast<int>(std::lround(kJudgedShare * tiles)));
