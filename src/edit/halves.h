@@ -31,10 +31,9 @@ HalvesReport writeHalves(const std::string& dump, const std::string& prefix, con
 
 /// Writes a dump of the samples of even, 0, or odd number, 1, of each pixel, those that the pictures of a
 /// half are the mean of, for denoisers that read dumps. Replicates are numbered anew, 0 for 0 and 1, 1 for 2
-/// and
-/// 3. Windows, channels and attributes stay; variolux:samples and variolux:renderSeconds become their share.
-/// `inputs` is for the header's kInputsAttribute. Returns the number of samples. Works by bands of rows.
-/// Throws Error as DumpReader and DumpWriter, and where there are no such samples.
+/// and 3. Windows, channels and attributes stay; variolux:samples and variolux:renderSeconds become their
+/// share. `inputs` is for the header's kInputsAttribute. Returns the number of samples. Works by bands of
+/// rows. Throws Error as DumpReader and DumpWriter, and where there are no such samples.
 std::uint64_t writeHalfDump(const std::string& dump, const std::string& output, int parity,
                             DumpCompression compression = DumpCompression::Rle,
                             const std::string& inputs = {}, const Progress& progress = {});

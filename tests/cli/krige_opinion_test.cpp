@@ -87,6 +87,11 @@ TEST_F(KrigeOpinion, AnImageIsAssessed) {
     EXPECT_GT(report["high"].get<double>(), report["relMse"].get<double>());
     EXPECT_LT(report["low"].get<double>(), report["relMse"].get<double>());
     EXPECT_FALSE(report["byHalves"].is_null());
+    const ToolRun again =
+        runTool("vlx-krige", {kSamples, "-o", out, "--json", "--assess", image, "--assess-halves",
+                              folder / "h,1_even_color.pfm" + "," + (folder / "h,1_odd_color.pfm")});
+    EXPECT_EQ(again.out, run.out);  // finished, and its answer kept
+    EXPECT_NE(again.err.find("skipped"), std::string::npos) << again.err;
     EXPECT_EQ(readImage(out).channels, (std::vector<std::string>{"confidence", "bias.R", "bias.G", "bias.B",
                                                                  "stddev.R", "stddev.G", "stddev.B"}));
     // The plain average's error, as its own samples tell it.

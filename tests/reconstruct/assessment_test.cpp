@@ -9,6 +9,7 @@
 #include "opinion_pictures.h"
 #include "reconstruct/opinion/evidence.h"
 #include "variolux/base/error.h"
+#include "variolux/dump/half_samples.h"
 
 namespace vlx {
 namespace {
@@ -118,11 +119,35 @@ TEST(Assessment, OnePixelProvesNothingAroundIt) {
     const auto wild = [](int x, int y) { return x == 45 && y == 45 ? 1000 : truthAt(x, y); };
     const Assessment of = assess(samplesOf(eightSamples), assessedOf(wild, true));
     EXPECT_NEAR(of.map.at(45, 45)[0], 1000, 100);  // its own error is known
+    EXPECT_LT(of.map.at(45, 45)[6], 1e-3f);
     for (const int away : {3, 8, 14})
         for (int c = 0; c < 3; ++c) {
             EXPECT_EQ(of.map.at(45 + away, 45)[3 + c], 0) << away;
             EXPECT_GT(of.map.at(45 + away, 45)[6], 1e-3f) << away;
         }
+}
+
+TEST(Assessment, HalvesThatAreNotTheImagesAreRefused) {
+    const SampleBuffer samples = samplesOf(eightSamples);
+    const auto refusedWith = [&](const Image& even, const Image& odd) {
+        SecondOpinion opinion{opinionOf(1), {}};
+        opinion.halves = {even, odd};
+        const AssessmentReport report =
+            assess(samples, {.quality = Quality::Draft,
+                             .secondOpinion = std::make_shared<SecondOpinion>(std::move(opinion))})
+                .report;
+        EXPECT_EQ(report.validated, report.refused.empty());
+        EXPECT_EQ(report.byHalvesError > 0, report.validated);
+        return report.refused;
+    };
+    const auto averageOf = [&](int parity) {
+        return reconstruct(HalfSamples(samples, false, parity), Mean{}).image.select({"R", "G", "B"});
+    };
+    EXPECT_EQ(refusedWith(opinionOf(2), opinionOf(3)), "");
+    EXPECT_NE(refusedWith(opinionOf(2), opinionOf(2)).find("same image"), std::string::npos);
+    EXPECT_NE(refusedWith(averageOf(0), averageOf(1)).find("were they denoised"), std::string::npos);
+    EXPECT_NE(refusedWith(opinionOf(2, tooDark), opinionOf(3, tooDark)).find("from their mean"),
+              std::string::npos);
 }
 
 TEST(Assessment, NeedsAnImageOfTheWholePicture) {

@@ -41,9 +41,11 @@ std::map<std::string, double> assessedErrors(const SweepPlan& plan, const std::s
         const ProcessRun divided =
             runCommand(plan.executable("vlx-pack subset " + shellQuoted(dump) + " --half " + parity +
                                        " --overwrite -q -o " + shellQuoted(half)));
-        const ProcessRun run = runCommand(plan.executable(
-            filled(command, {{"input", shellQuoted(half)}, {"output", shellQuoted(denoised)}})));
-        whole = whole && divided.exitCode == 0 && run.exitCode == 0 && std::filesystem::exists(denoised);
+        whole = whole && divided.exitCode == 0 &&
+                runCommand(plan.executable(filled(
+                               command, {{"input", shellQuoted(half)}, {"output", shellQuoted(denoised)}})))
+                        .exitCode == 0 &&
+                std::filesystem::exists(denoised);
         halves += (halves.empty() ? "" : ",") + denoised;
     }
     const std::string map = files.add(stem + ".map.exr");

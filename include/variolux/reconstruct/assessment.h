@@ -5,7 +5,8 @@
 /// How wrong another denoiser's image is, said by the samples that it was made of: METHOD.md, 7.12.
 namespace vlx {
 
-/// Of the whole image; relMSE is the mean over pixels and colours of (D - truth)^2 / (truth^2 + 0.01).
+/// Of the whole image; relMSE is the mean over pixels and colours of (D - truth)^2 / (truth^2 + 0.01),
+/// in which y^2 + s^2 of the combination and its standard deviation stand for truth^2.
 struct AssessmentReport {
     double relMse = 0;
     double low = 0, high = 0;  ///< its 95 % interval

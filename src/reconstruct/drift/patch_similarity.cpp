@@ -32,8 +32,8 @@ VLX_WIDE void addDifferences(const float* z1, const float* z2, const float* v1, 
     }
 }
 
-/// Sums over patches: kSpan x kSpan to kTile x kTile; seven are two pairs of pairs less their overlap, so
-/// that pairs are summed once.
+/// Sums over patches: kSpan x kSpan to kTile x kTile; seven are three pairs and one, and pairs are
+/// summed once.
 VLX_WIDE void sumPatches(const float* __restrict in, float scale, float* __restrict scratch,
                          float* __restrict out, std::size_t outStride) {
     static_assert(kPatchRadius == 3);

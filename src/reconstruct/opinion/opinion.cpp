@@ -351,7 +351,7 @@ ReconstructionReport reconstructWithOpinion(const SampleSource& source, const Dr
         if (image && (image->data != picture || image->channelCount() != 3))
             throw Error(source.path(),
                         "expected another denoiser's image of R, G, B over the samples' window");
-    const std::uint64_t planes = 6 + 6 + 3 + 4 + 1;  // means twice, the image, evidence
+    const std::uint64_t planes = 9 + 13 + 1;  // SampleMeans, what the image differs by, evidence
     requireMemory(source.path(), imageBytes(picture, planes), "another denoiser's image beside the means");
 
     Steps steps{progress, 0, outline.data.height};
