@@ -41,6 +41,23 @@ template <class V, class T>
     *reinterpret_cast<typename Vectors<T, sizeof(V)>::Loose*>(p) = x;
 }
 
+/// Eight floats: two registers with SSE, one with AVX; the same sums in both, since their order is fixed.
+using Eight = Vectors<float, 32>::Type;
+using EightIntegers = Vectors<int, 32>::Type;
+inline constexpr EightIntegers kEightLanes = {0, 1, 2, 3, 4, 5, 6, 7};
+
+/// Lane i is v[from[i]].
+template <class V, class Integers>
+[[gnu::always_inline]] inline V permute(V v, Integers from) {
+#ifdef __clang__
+    V permuted = {};
+    for (int i = 0; i < kLanes<V>; ++i) permuted[i] = v[from[i]];
+    return permuted;
+#else
+    return __builtin_shuffle(v, from);
+#endif
+}
+
 template <class V>
 [[gnu::always_inline]] inline V spread(double x) {
     return x - V{};
@@ -140,11 +157,12 @@ template <class V>
 
 /// exp(-d) within 0.02 for d >= 0, exactly 0 from 8 on: (1 - d/8)^8. A weight needs no more, and this is four
 /// products.
-inline float nearExp(float d) {
-    const float base = 1 - 0.125f * d;
-    const float positive = base > 0 ? base : 0;
-    const float square = positive * positive;
-    const float fourth = square * square;
+template <class T>
+[[gnu::always_inline]] inline T nearExp(T d) {
+    const T base = 1 - 0.125f * d;
+    const T positive = base > 0 ? base : T{};
+    const T square = positive * positive;
+    const T fourth = square * square;
     return fourth * fourth;
 }
 

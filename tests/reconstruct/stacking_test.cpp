@@ -94,20 +94,28 @@ TEST(PatchDistances, AreSquaredDifferencesInUnitsOfTheirNoise) {
     EXPECT_NEAR(out[5 * kTile + 8], 0, 1);
 }
 
-TEST(PatchDistances, FromOnePixelAreThoseOfAll) {
+TEST(PatchDistances, FromOnePixelAndOfALatticeAreThoseOfAll) {
     PatchTile tile = noisyTile(0.04f, 0.5f);
     for (std::size_t i = 0; i < tile.variance.size(); ++i)
         tile.variance[i] *= 1 + 0.1f * static_cast<float>(i % 7);
     tile.setScale(1e-3f);
-    std::vector<float> scratch, all(kTile * kTile), one((2 * kMaxReach + 1) * kDistanceStride);
-    for (const auto& [column, row] : {std::pair{0, 0}, {31, 31}, {13, 20}}) {
-        patchDistancesFrom(tile, column, row, one.data());
-        for (const auto& [dx, dy] : {std::pair{0, 0}, {-15, -15}, {15, 15}, {15, -15}, {-7, 3}}) {
-            patchDistances(tile, dx, dy, scratch, all.data());
-            const float d = all[static_cast<std::size_t>(row * kTile + column)];
-            EXPECT_NEAR(one[static_cast<std::size_t>((dy + kMaxReach) * kDistanceStride + dx + kMaxReach)], d,
-                        1e-5f * (1 + std::abs(d)))
-                << column << " " << row << " " << dx << " " << dy;
+    std::vector<float> scratch, all(kTile * kTile), one;
+    for (const int reach : {3, 4, 8, 15}) {
+        const Surroundings around{reach};
+        PatchLattice lattice{{0, 13, 31}, {0, 20, 31}, around, {}};
+        latticeDistances(tile, std::vector{&lattice}, scratch);
+        one.resize(static_cast<std::size_t>(around.size()));
+        for (const std::size_t i : {0U, 1U, 2U}) {
+            const int column = lattice.columns[i], row = lattice.rows[i];
+            patchDistancesFrom(tile, column, row, around, one.data());
+            for (const auto& [dx, dy] :
+                 {std::pair{0, 0}, {-reach, -reach}, {reach, reach}, {reach, -reach}, {-2, 3}}) {
+                patchDistances(tile, dx, dy, scratch, all.data());
+                const float d = all[static_cast<std::size_t>(row * kTile + column)];
+                for (const float* of : {one.data(), lattice.of(i, i)})
+                    EXPECT_NEAR(of[around.at(dx, dy)], d, 1e-5f * (1 + std::abs(d)))
+                        << reach << ": " << column << " " << row << " " << dx << " " << dy;
+            }
         }
     }
 }

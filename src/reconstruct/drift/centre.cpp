@@ -17,8 +17,6 @@ constexpr int kPriorIterations = 4;
 constexpr double kWildVariances = 9;  // beyond three standard deviations a value may be wild
 constexpr double kFew = 0.02;         // of the values: as many may be
 
-int lanesUp(int n) { return (n + 7) & ~7; }
-
 /// A feature's values in a neighbourhood.
 struct WeightedValues {
     float* values;
@@ -67,31 +65,17 @@ double forgetWild(const WeightedValues& of, float square, std::vector<float>& so
 
 }  // namespace
 
-void Centre::begin(const TilePlanes& tile, int at, int reach) {
-    tile_ = tile;
-    centre_ = static_cast<std::size_t>(at);
-    reach_ = reach;
-    stride_ = lanesUp((2 * reach + 1) * (2 * reach + 1));
-    const int most = 1 + kPositionFunctions + tile.featureCount + tile.radiance + kBlockRows;
-    rows_.resize(static_cast<std::size_t>(most * stride_));
-    index_.resize(static_cast<std::size_t>(stride_));
-    for (auto* of : {&weights_, &predicted_}) of->resize(static_cast<std::size_t>(stride_));
-    count_ = 0;
-    own_ = std::max(1.f, tile.counts[centre_]);
-    gaps_ = false;
-    noise_ = total_ = 0;
-}
-
-void Centre::krige(float* sums, NeighbourhoodCounts& counts) {
+void Centre::krige(const TilePlanes& tile, int at, const Surroundings& around, const float* alike,
+                   float* sums, NeighbourhoodCounts& counts) {
+    begin(tile, at, around);
+    select(around, alike);
     if (total_ <= 0) return;
     ++counts.neighbourhoods;
-    std::fill(weights_.begin() + count_, weights_.begin() + lanesUp(count_), 0.f);
     stackFunctions();
     stackRadiance();
     weighted_.resize(rows_.size());
     gram_.resize(static_cast<std::size_t>(gramRows_ * gramRows_));
-    weightedGram(rows_.data(), weights_.data(), gramRows_, stride_, lanesUp(size()), weighted_.data(),
-                 gram_.data());
+    weightedGram(rows_.data(), weights_.data(), gramRows_, stride_, padded(), weighted_.data(), gram_.data());
     const RandomDrift drift = fit();
     counts.features += static_cast<std::int64_t>(varying_.size());
     counts.failed += !drift.ok;
@@ -99,28 +83,64 @@ void Centre::krige(float* sums, NeighbourhoodCounts& counts) {
     predict(drift, sums);
 }
 
-/// The constant and the features about the centre's. Features that are constant here explain nothing: they
-/// have no row.
+void Centre::begin(const TilePlanes& tile, int at, const Surroundings& around) {
+    tile_ = tile;
+    centre_ = static_cast<std::size_t>(at);
+    reach_ = around.reach;
+    constexpr int kRoom = 8;  // gather() writes whole vectors
+    stride_ = around.size() + kRoom;
+    const int most = 1 + kPositionFunctions + tile.featureCount + tile.radiance + kBlockRows;
+    rows_.resize(static_cast<std::size_t>(most * stride_));
+    errors_.resize(static_cast<std::size_t>((tile.featureCount + 1) * stride_));
+    runs_.resize(static_cast<std::size_t>(around.size() / 8));
+    for (auto* of : {&weights_, &predicted_}) of->resize(static_cast<std::size_t>(stride_));
+}
+
+void Centre::list(const float* plane, float about, float* values) const {
+    gather(plane, runs_.data(), runCount_, about, values);
+    std::fill(values + count_, values + padded(), 0.f);
+}
+
+/// The data, their weights and places.
+void Centre::select(const Surroundings& around, const float* alike) {
+    const DataCounts found = selectData(around, alike, kLeastWeight, static_cast<int>(centre_), kTileSide,
+                                        runs_.data(), predicted_.data(), row(1), row(2));
+    count_ = found.data;
+    runCount_ = found.runs;
+    for (float* of : {predicted_.data(), row(1), row(2)}) std::fill(of + count_, of + padded(), 0.f);
+    float *const counts = row(3), *const errors = row(4);
+    list(tile_.counts, 0, counts);
+    list(tile_.errors, 0, errors);
+    const float own = std::max(1.f, tile_.counts[centre_]);
+    const DataWeights sums = weighData(counts, errors, own, kLeastCountRatio, kMostCountRatio, padded(),
+                                       predicted_.data(), weights_.data());
+    total_ = sums.total;
+    noise_ = sums.noise;
+    gaps_ = sums.gaps;
+}
+
+/// The constant, positions, and the features about the centre's. Features that are constant here explain
+/// nothing: they have no row.
 void Centre::stackFunctions() {
-    const int n = size(), padded = lanesUp(n);
+    const int n = padded();
     std::fill_n(row(0), n, 1.f);
+    multiply(row(1), row(1), n, row(3));
+    multiply(row(2), row(2), n, row(4));
+    multiply(row(1), row(2), n, row(5));
     varying_.clear();
     for (int f = 0; f < tile_.featureCount; ++f) {
         const float* values = tile_.features + TilePlanes::plane(f);
-        const float about = values[centre_];
-        float* x = row(1 + kPositionFunctions + static_cast<int>(varying_.size()));
-        for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - about;
-        std::fill(x + n, x + padded, 0.f);
-        if (forgetWild({x, weights_.data(), n, padded, total_}, kFarthest * kFeatureWidth2, sorted_) <
+        const auto next = static_cast<int>(varying_.size());
+        float* const x = row(1 + kPositionFunctions + next);
+        list(values, values[centre_], x);
+        if (forgetWild({x, weights_.data(), count_, n, total_}, kFarthest * kFeatureWidth2, sorted_) <
             kLeastFeatureSpread)
             continue;
-        const float* errors = tile_.features + TilePlanes::plane(FeaturePlanes{tile_.featureCount}.error(f));
-        double sum = 0;
-        for (int i = 0; i < n; ++i) {
-            const auto k = static_cast<std::size_t>(i);
-            sum += static_cast<double>(weights_[k] * errors[index_[k]]);
-        }
-        featureNoise_[varying_.size()] = sum;
+        float* const errors = errors_.data() + next * stride_;
+        list(tile_.features + TilePlanes::plane(FeaturePlanes{tile_.featureCount}.error(f)), 0, errors);
+        double sums[2];
+        weightedSums(errors, weights_.data(), n, sums);
+        featureNoise_[varying_.size()] = sums[0];
         varying_.push_back(f);
     }
     functions_ = kPositionFunctions + static_cast<int>(varying_.size());
@@ -128,14 +148,13 @@ void Centre::stackFunctions() {
 
 /// Radiance about the centre's; the rest of the rows is 0.
 void Centre::stackRadiance() {
-    const int n = size(), used = 1 + functions_ + tile_.radiance;
+    const int used = 1 + functions_ + tile_.radiance;
     gramRows_ = (used + kBlockRows - 1) / kBlockRows * kBlockRows;
     for (int c = 0; c < tile_.radiance; ++c) {
         const float* values = tile_.means + TilePlanes::plane(c);
-        float* x = row(1 + functions_ + c);
-        for (int i = 0; i < n; ++i) x[i] = values[index_[static_cast<std::size_t>(i)]] - values[centre_];
+        list(values, values[centre_], row(1 + functions_ + c));
     }
-    for (int r = 0; r < gramRows_; ++r) std::fill(row(r) + (r < used ? n : 0), row(r) + lanesUp(n), 0.f);
+    for (int r = used; r < gramRows_; ++r) std::fill_n(row(r), padded(), 0.f);
 }
 
 /// The normal equations about the weighted means, of functions that are standardised; constant ones are left
@@ -187,7 +206,7 @@ RandomDrift Centre::fit() {
 /// No function is followed beyond the data: pixels without any take its nearest value among them. Few data
 /// fix coefficients that hold between them, and are thousands of times too large elsewhere.
 void Centre::limitFunctions() {
-    const auto n = static_cast<std::size_t>(size());
+    const auto n = static_cast<std::size_t>(count_);
     for (int j = 1; j <= functions_; ++j) {
         float* const x = row(j);
         float least = std::numeric_limits<float>::infinity(), most = -least;
@@ -203,76 +222,61 @@ void Centre::limitFunctions() {
 
 void Centre::predict(const RandomDrift& drift, float* sums) {
     const EstimatePlanes out{tile_.radiance};
-    const int n = size(), padded = lanesUp(n);
+    const int n = padded();
+    const auto plane = [&](int k) { return sums + TilePlanes::plane(k); };
+    const auto add = [&](const float* values, int k) { scatter(values, runs_.data(), runCount_, plane(k)); };
     // Towards its border a neighbourhood counts less, else its border shows.
-    const auto perNoise = static_cast<float>(1 / variance_);
     const float edge = static_cast<float>(reach_) / static_cast<float>(reach_ + 1);
-    const auto taper = [&](float u) {
-        const float v = 1 - edge * edge * u * u;
-        return v * v;
-    };
-    for (int i = 0; i < n; ++i)
-        predicted_[static_cast<std::size_t>(i)] *= perNoise * taper(row(1)[i]) * taper(row(2)[i]);
-    scatter(predicted_.data(), sums + TilePlanes::plane(out.weight()));
+    taper(row(1), row(2), edge * edge, static_cast<float>(1 / variance_), n, predicted_.data());
+    add(predicted_.data(), out.weight());
     if (gaps_) limitFunctions();
+    estimates_.resize(static_cast<std::size_t>(6 * stride_));
+    float *const about = estimates_.data(), *const sum = about + stride_, *const square = sum + stride_,
+                 *const fromFeatures = square + stride_;
     // Kriging variance, on average over the data: the constant and each effective function cost one part in
     // as many as there are.
     const auto part = static_cast<float>((1 + drift.effective) / total_);
     const float krigingVariance = static_cast<float>(variance_) * part;
     for (int i = 0; i < n; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        float* const sum = sums + index_[k];
-        sum[TilePlanes::plane(out.variance())] += predicted_[k] * krigingVariance;
-        sum[TilePlanes::plane(out.leverage())] += predicted_[k] * std::min(1.f, weights_[k] * part);
+        sum[i] = predicted_[k] * krigingVariance;
+        square[i] = predicted_[k] * std::min(1.f, weights_[k] * part);
     }
-    estimates_.resize(static_cast<std::size_t>(7 * padded));
-    float* const estimate = estimates_.data();
-    float *const about = estimate + padded, *const sum = about + padded, *const square = sum + padded,
-                 *const fromFeatures = square + padded;
-    sumFeatureErrors(drift, fromFeatures, padded);
-    std::array<float, kMaxRandomDrift> coefficients;
+    add(sum, out.variance());
+    add(square, out.leverage());
+    sumFeatureErrors(drift, fromFeatures);
     for (int c = 0; c < tile_.radiance; ++c) {
         double offset = tile_.means[TilePlanes::plane(c) + centre_] + gram(1 + functions_ + c, 0) / total_;
-        coefficients.fill(0);
+        std::array<float, kMaxRandomDrift> coefficients;
         for (std::size_t i = 0; i < used_.size(); ++i) {
             const double b = drift.coefficients(static_cast<Eigen::Index>(i), c) * unit_[i];
-            coefficients[static_cast<std::size_t>(used_[i] - 1)] = static_cast<float>(b);
+            coefficients[i] = static_cast<float>(b);
             offset -= b * gram(used_[i], 0) / total_;
         }
-        predictRow(row(1), coefficients.data(), functions_, stride_, n, static_cast<float>(offset), estimate);
-        const float* references = tile_.references + TilePlanes::plane(c);
-        for (int i = 0; i < n; ++i) about[i] = references[index_[static_cast<std::size_t>(i)]];
-        addEstimates(estimate, about, predicted_.data(), n, sum, square);
-        scatter(sum, sums + TilePlanes::plane(out.sum(c)));
-        if (c < 3) addProducts(predicted_.data(), fromFeatures + c * padded, n, square);
-        if (c < 3) scatter(square, sums + TilePlanes::plane(out.square(c)));
+        list(tile_.references + TilePlanes::plane(c), 0, about);
+        predictChannel(
+            {rows_.data(), stride_, static_cast<int>(used_.size()), used_.data(), coefficients.data()},
+            static_cast<float>(offset), about, predicted_.data(), fromFeatures + std::min(c, 2) * n, n, sum,
+            square);
+        add(sum, out.sum(c));
+        if (c < 3) add(square, out.square(c));
     }
 }
 
 /// What errors of the features make of R, G, B of each datum, sum over features of b^2 u: both halves have it
-/// in common, so it counts twice in the mean of their variances.
-void Centre::sumFeatureErrors(const RandomDrift& drift, float* out, int padded) const {
-    std::fill_n(out, 3 * padded, 0.f);
+/// in common, so it counts twice in the mean of their variances. Three lists.
+void Centre::sumFeatureErrors(const RandomDrift& drift, float* out) const {
+    std::fill_n(out, 3 * padded(), 0.f);
     for (std::size_t j = 0; j < used_.size(); ++j) {
         const int f = used_[j] - 1 - kPositionFunctions;
         if (f < 0 || featureNoise_[static_cast<std::size_t>(f)] == 0) continue;
-        const float* errors =
-            tile_.features +
-            TilePlanes::plane(FeaturePlanes{tile_.featureCount}.error(varying_[static_cast<std::size_t>(f)]));
         float square[3];
         for (int c = 0; c < 3; ++c) {
             const double b = drift.coefficients(static_cast<Eigen::Index>(j), c) * unit_[j];
             square[c] = 2 * static_cast<float>(b * b);
         }
-        for (int i = 0; i < size(); ++i) {
-            const float error = errors[index_[static_cast<std::size_t>(i)]];
-            for (int c = 0; c < 3; ++c) out[c * padded + i] += square[c] * error;
-        }
+        addErrors(errors_.data() + f * stride_, square, padded(), out);
     }
-}
-
-void Centre::scatter(const float* values, float* to) const {
-    for (int i = 0; i < size(); ++i) to[index_[static_cast<std::size_t>(i)]] += values[i];
 }
 
 }  // namespace vlx

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <vector>
 
+#include "reconstruct/drift/gram.h"
 #include "reconstruct/drift/neighbourhoods.h"
 #include "variolux/geostat/random_drift.h"
 
@@ -12,6 +12,7 @@ namespace vlx {
 
 inline constexpr int kPositionFunctions = 5;   ///< x, y, x^2, y^2, xy
 inline constexpr float kFarthest = 3.6f;       ///< composite distance: data farther away weigh nothing
+inline constexpr float kLeastWeight = 0.01f;   ///< of a datum: nearExp(kFarthest)
 inline constexpr float kLeastSquare = 1e-30f;  ///< of radiance, or of its noise
 inline constexpr float kMostCountRatio =
     4;  ///< a datum counts at most as many samples as four of the centre's
@@ -37,18 +38,21 @@ struct TilePlanes {
 /// A centre and the data around it. Its memory is kept for the next.
 class Centre {
   public:
-    /// Begins at place `at` of the tile's planes.
-    void begin(const TilePlanes& tile, int at, int reach);
-    /// The pixel (dx, dy) away, which is `alike` the centre (0 to 1).
-    void add(int dx, int dy, float alike);
-    /// Kriges, and adds what is predicted for all its pixels to `sums` (EstimatePlanes of one half).
-    void krige(float* sums, NeighbourhoodCounts& counts);
+    /// The centre at place `at` of the tile's planes; `alike`: what the pixels of its surroundings are like
+    /// it, from 0 to 1. Kriges, and adds what is predicted for all of them to `sums` (EstimatePlanes of one
+    /// half).
+    void krige(const TilePlanes& tile, int at, const Surroundings& around, const float* alike, float* sums,
+               NeighbourhoodCounts& counts);
 
   private:
-    int size() const { return count_; }
+    int padded() const { return (count_ + 7) & ~7; }
     float* row(int r) { return rows_.data() + r * stride_; }
+    /// The data's values of a plane, less `about`; 0 beyond the data.
+    void list(const float* plane, float about, float* values) const;
+    void begin(const TilePlanes& tile, int at, const Surroundings& around);
+    void select(const Surroundings& around, const float* alike);
     double gram(int a, int b) const {
-        return gram_[static_cast<std::size_t>(a >= b ? a * gramRows_ + b : b * gramRows_ + a)];
+        return gram_[static_cast<std::size_t>(a >= b ? b * gramRows_ + a : a * gramRows_ + b)];
     }
     /// Sums of products about the weighted means.
     double centred(int a, int b) const { return gram(a, b) - gram(a, 0) * gram(b, 0) / total_; }
@@ -57,15 +61,14 @@ class Centre {
     RandomDrift fit();
     void limitFunctions();
     void predict(const RandomDrift& drift, float* sums);
-    void sumFeatureErrors(const RandomDrift& drift, float* out, int padded) const;
-    void scatter(const float* values, float* to) const;
+    void sumFeatureErrors(const RandomDrift& drift, float* out) const;
 
     TilePlanes tile_;
     std::size_t centre_ = 0;
     int reach_ = 0, stride_ = 0;
-    float own_ = 1;                           // samples of the centre, one at least
-    int count_ = 0;                           // of data, and pixels to be predicted
-    std::vector<int> index_;                  // of the data, in a plane
+    int count_ = 0;              // of data, and pixels to be predicted
+    std::vector<DataRun> runs_;  // where they lie
+    int runCount_ = 0;
     std::vector<float> weights_, predicted_;  // of the data; of what is predicted there
     bool gaps_ = false;                       // pixels without data are among them
     double noise_ = 0, total_ = 0;            // sums over data: of weighted error variances, of weights
@@ -73,8 +76,8 @@ class Centre {
 
     /// Rows as long as there are data, each `stride_` apart: 1, position functions, features that vary,
     /// radiance.
-    std::vector<float> rows_, weighted_, sorted_, estimates_;
-    std::vector<int> varying_;                            // features
+    std::vector<float> rows_, errors_, weighted_, sorted_, estimates_;  // errors_: of features that vary
+    std::vector<int> varying_;                                          // features
     std::array<double, kMaxRandomDrift> featureNoise_{};  // of each of them: summed weighted error variances
     int functions_ = 0, gramRows_ = 0;
     std::vector<double> gram_;
@@ -82,28 +85,5 @@ class Centre {
     std::vector<int> used_, group_;  // rows that are drift functions: those that are not constant
     std::array<double, kMaxRandomDrift> unit_{};  // one over the standard deviation of each
 };
-
-inline void Centre::add(int dx, int dy, float alike) {
-    const int at = static_cast<int>(centre_) + dy * kTileSide + dx;
-    const auto place = static_cast<std::size_t>(at), next = static_cast<std::size_t>(count_++);
-    const float ratio = std::clamp(tile_.counts[place] / own_, kLeastCountRatio, kMostCountRatio);
-    const float weight = alike * ratio;
-    const bool datum = tile_.counts[place] > 0;
-    index_[next] = at;
-    weights_[next] = datum ? weight : 0.f;
-    predicted_[next] = weight;
-    const float perReach = 1.f / static_cast<float>(reach_);
-    const float px = static_cast<float>(dx) * perReach, py = static_cast<float>(dy) * perReach;
-    float* p = row(1) + next;
-    p[0] = px;
-    p[stride_] = py;
-    p[2 * stride_] = px * px;
-    p[3 * stride_] = py * py;
-    p[4 * stride_] = px * py;
-    gaps_ = gaps_ || !datum;
-    if (!datum) return;
-    noise_ += static_cast<double>(weight) * tile_.errors[place] * ratio;
-    total_ += static_cast<double>(weight);
-}
 
 }  // namespace vlx

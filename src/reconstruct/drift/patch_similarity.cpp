@@ -1,7 +1,7 @@
 #include "reconstruct/drift/patch_similarity.h"
 
 #include <algorithm>
-#include <cstring>
+#include <cstdlib>
 
 #include "base/simd.h"
 
@@ -9,80 +9,133 @@ namespace vlx {
 
 namespace {
 
+using simd::Eight;
+using simd::load;
+using simd::store;
+
 constexpr int kSpan = kTile + 2 * kPatchRadius;  // pixels whose differences a tile's patches use
+constexpr int kSpanStride = (kSpan + 7) / 8 * 8;
 constexpr float kRelativeFloor = 1e-6f;
 constexpr int kPatchPixels = (2 * kPatchRadius + 1) * (2 * kPatchRadius + 1);
+constexpr int kCorner = (kTileMargin - kPatchRadius) * (kTileSide + 1);
 
-/// Adds one channel's differences over kSpan x kSpan pixels.
-VLX_WIDE void addDifferences(const float* z1, const float* z2, const float* v1, const float* v2,
-                             const float* s1, const float* s2, float* out) {
-    for (int row = 0; row < kSpan; ++row) {
-        const float* __restrict a = z1 + row * kTileSide;
-        const float* __restrict b = z2 + row * kTileSide;
-        const float* __restrict va = v1 + row * kTileSide;
-        const float* __restrict vb = v2 + row * kTileSide;
-        const float* __restrict sa = s1 + row * kTileSide;
-        const float* __restrict sb = s2 + row * kTileSide;
-        float* __restrict o = out + row * kSpan;
-        for (int i = 0; i < kSpan; ++i) {
-            const float d = a[i] - b[i];
-            const float least = va[i] < vb[i] ? va[i] : vb[i];
-            o[i] += (d * d - (va[i] + least)) / (sa[i] + sb[i]);
+/// What two pixels differ by, of the squares of their values' differences.
+[[gnu::always_inline]] inline Eight difference(Eight squares, Eight noise, Eight otherNoise, Eight scales) {
+    return (squares - (noise + simd::minimum(noise, otherNoise))) / scales;
+}
+
+/// Differences of kSpan rows of pixels from those `shift` further on.
+template <int Channels>
+[[gnu::always_inline]] inline void sumDifferences(const PatchTile& tile, int shift, float* out) {
+    const float *const z = tile.values(0), *const v = tile.noise.data(), *const s = tile.scale.data();
+    for (int row = 0; row < kSpan; ++row)
+        for (int i = 0; i < kSpanStride; i += 8) {
+            const int here = kCorner + row * kTileSide + i, there = here + shift;
+            Eight squares = {};
+            for (int c = 0; c < Channels; ++c) {
+                const float* const of = z + PatchTile::plane(c);
+                const Eight d = load<Eight>(of + here) - load<Eight>(of + there);
+                squares += d * d;
+            }
+            store(out + row * kSpanStride + i,
+                  difference(squares, load<Eight>(v + here), load<Eight>(v + there),
+                             load<Eight>(s + here) + load<Eight>(s + there)));
+        }
+}
+
+VLX_WIDE void sumDifferences(const PatchTile& tile, int shift, float* out) {
+    switch (tile.channels) {
+        case 1:
+            return sumDifferences<1>(tile, shift, out);
+        case 2:
+            return sumDifferences<2>(tile, shift, out);
+        default:
+            return sumDifferences<3>(tile, shift, out);
+    }
+}
+
+/// Sums over patches: kSpan rows to kTile x kTile; seven are three pairs and one, and pairs are summed once.
+/// In passes over the whole tile: what was just stored is not loaded again at once.
+VLX_WIDE void sumPatches(const float* __restrict in, float scale, float* __restrict scratch,
+                         float* __restrict out) {
+    static_assert(kPatchRadius == 3);
+    constexpr int kPairs = (kSpan - 1) * kSpanStride, kColumns = kTile * kSpanStride;
+    float* __restrict pairs = scratch;  // of rows r and r + 1
+    float* __restrict columns = pairs + kPairs;
+    float* __restrict two = columns + kColumns + 8;
+    for (int i = 0; i < kPairs; ++i) pairs[i] = in[i] + in[i + kSpanStride];
+    for (int i = 0; i < kColumns; ++i)
+        columns[i] =
+            (pairs[i] + pairs[i + 2 * kSpanStride]) + (pairs[i + 4 * kSpanStride] + in[i + 6 * kSpanStride]);
+    for (int i = 0; i < kColumns; ++i) two[i] = columns[i] + columns[i + 1];
+    for (int row = 0; row < kTile; ++row)
+        for (int i = 0; i < kTile; ++i) {
+            const int at = row * kSpanStride + i;
+            out[row * kTile + i] = ((two[at] + two[at + 2]) + (two[at + 4] + columns[at + 6])) * scale;
+        }
+}
+constexpr std::size_t kPatchScratch = (kSpan - 1 + 2 * kTile) * kSpanStride + 16;
+
+/// patchDistancesFrom() in rows of Vectors vectors.
+template <int Vectors>
+[[gnu::always_inline]] inline void distancesFrom(const PatchTile& tile, int here, int reach, float scale,
+                                                 float* out) {
+    const float *const z = tile.values(0), *const v = tile.noise.data(), *const s = tile.scale.data();
+    for (int dy = -reach; dy <= reach; ++dy) {
+        const int there = here + dy * kTileSide - reach;
+        Eight sum[Vectors] = {};
+        for (int row = -kPatchRadius; row <= kPatchRadius; ++row)
+            for (int i = row * kTileSide - kPatchRadius; i <= row * kTileSide + kPatchRadius; ++i)
+                for (int k = 0; k < Vectors; ++k) {
+                    const int at = there + i + 8 * k;
+                    Eight squares = {};
+                    for (int c = 0; c < 3; ++c) {
+                        const float* const of = z + PatchTile::plane(c);
+                        const Eight d = of[here + i] - load<Eight>(of + at);
+                        squares += d * d;
+                    }
+                    sum[k] += difference(squares, v[here + i] + Eight{}, load<Eight>(v + at),
+                                         s[here + i] + load<Eight>(s + at));
+                }
+        for (int k = 0; k < Vectors; ++k) store(out + 8 * k, sum[k] * scale);
+        out += 8 * Vectors;
+    }
+}
+
+VLX_WIDE void distancesFrom(const PatchTile& tile, int here, int reach, int vectors, float scale,
+                            float* out) {
+    switch (vectors) {
+        case 1:
+            return distancesFrom<1>(tile, here, reach, scale, out);
+        case 2:
+            return distancesFrom<2>(tile, here, reach, scale, out);
+        case 3:
+            return distancesFrom<3>(tile, here, reach, scale, out);
+        default:
+            return distancesFrom<4>(tile, here, reach, scale, out);
+    }
+}
+
+/// Sums of `in` over the patches of a lattice's pixels: one at `out` for each, `step` apart.
+VLX_WIDE void sumLattice(const float* in, const int* columns, std::size_t columnCount, const int* rows,
+                         std::size_t rowCount, float scale, float* out, std::size_t step) {
+    static_assert(kPatchRadius == 3);
+    for (std::size_t j = 0; j < rowCount; ++j) {
+        alignas(32) float sums[kSpanStride];
+        for (int i = 0; i < kSpanStride; i += 8) {
+            const float* const at = in + rows[j] * kSpanStride + i;
+            const auto row = [&](int r) { return load<Eight>(at + r * kSpanStride); };
+            store(sums + i, ((row(0) + row(1)) + (row(2) + row(3))) + ((row(4) + row(5)) + row(6)));
+        }
+        for (std::size_t i = 0; i < columnCount; ++i) {
+            const float* const s = sums + columns[i];
+            *out = (((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + s[6])) * scale;
+            out += step;
         }
     }
 }
 
-/// Sums over patches: kSpan x kSpan to kTile x kTile; seven are three pairs and one, and pairs are
-/// summed once.
-VLX_WIDE void sumPatches(const float* __restrict in, float scale, float* __restrict scratch,
-                         float* __restrict out, std::size_t outStride) {
-    static_assert(kPatchRadius == 3);
-    float* __restrict pairs = scratch;  // of rows r and r + 1
-    float* __restrict columns = scratch + kSpan * kSpan;
-    float* __restrict two = columns + kSpan;
-    for (int i = 0; i < (kSpan - 1) * kSpan; ++i) pairs[i] = in[i] + in[i + kSpan];
-    for (int row = 0; row < kTile; ++row) {
-        const float* __restrict p = pairs + row * kSpan;
-        const float* __restrict last = in + (row + 6) * kSpan;
-        for (int i = 0; i < kSpan; ++i) columns[i] = (p[i] + p[i + 2 * kSpan]) + (p[i + 4 * kSpan] + last[i]);
-        for (int i = 0; i < kSpan - 1; ++i) two[i] = columns[i] + columns[i + 1];
-        for (int i = 0; i < kTile; ++i)
-            out[i] = ((two[i] + two[i + 2]) + (two[i + 4] + columns[i + 6])) * scale;
-        out += outStride;
-    }
-}
-
-/// Eight floats: the same sums on every instruction set.
-typedef float Eight __attribute__((vector_size(32)));
-
-Eight eightAt(const float* p) {
-    Eight x;
-    std::memcpy(&x, p, sizeof x);
-    return x;
-}
-
-/// One row of patchDistancesFrom(): `here` is the pixel's place in a plane, `there` that of the row's first.
-VLX_WIDE void addPatchRow(const PatchTile& tile, int here, int there, float scale, float* out) {
-    constexpr int kVectors = kDistanceStride / 8;
-    Eight sum[kVectors] = {};
-    for (int c = 0; c < tile.channels; ++c) {
-        const float *const z = tile.values(c), *const v = tile.variances(c), *const s = tile.scales(c);
-        for (int row = -kPatchRadius; row <= kPatchRadius; ++row)
-            for (int i = row * kTileSide - kPatchRadius; i <= row * kTileSide + kPatchRadius; ++i) {
-                const float za = z[here + i], va = v[here + i], sa = s[here + i];
-                for (int k = 0; k < kVectors; ++k) {
-                    const int at = there + i + 8 * k;
-                    const Eight d = za - eightAt(z + at), vb = eightAt(v + at);
-                    const Eight least = vb < va ? vb : va + Eight{};
-                    sum[k] += (d * d - (va + least)) / (sa + eightAt(s + at));
-                }
-            }
-    }
-    for (int k = 0; k < kVectors; ++k) {
-        sum[k] *= scale;
-        std::memcpy(out + 8 * k, &sum[k], sizeof sum[k]);
-    }
-}
+constexpr float kPerPatch = 1.f / kPatchPixels;
 
 }  // namespace
 
@@ -100,34 +153,51 @@ void copyTile(const RowRing& ring, int plane, int x, int y, int width, int heigh
 void PatchTile::resize(int count) {
     constexpr std::size_t kPast = 8;
     channels = count;
-    for (auto* planes : {&value, &variance, &scale}) planes->resize(plane(count) + kPast);
+    for (auto* planes : {&value, &variance}) planes->resize(plane(count) + kPast);
+    for (auto* planes : {&noise, &scale}) planes->resize(plane(1) + kPast);
 }
 
 void PatchTile::setScale(float absoluteFloor) {
-    for (std::size_t i = 0; i < value.size(); ++i)
-        scale[i] = absoluteFloor / 2 + kRelativeFloor * value[i] * value[i] + variance[i];
+    for (std::size_t i = 0; i < plane(1); ++i) {
+        noise[i] = scale[i] = 0;
+        for (int c = 0; c < channels; ++c) {
+            const float z = values(c)[i], v = variances(c)[i];
+            noise[i] += v;
+            scale[i] += absoluteFloor / 2 + kRelativeFloor * z * z + v;
+        }
+    }
 }
 
-void patchDistances(const PatchTile& tile, int dx, int dy, std::vector<float>& scratch, float* out,
-                    std::size_t outStride) {
-    scratch.resize(2 * kSpan * kSpan + 2 * kSpan);
-    std::fill_n(scratch.data(), kSpan * kSpan, 0.f);
-    constexpr int kCorner = (kTileMargin - kPatchRadius) * (kTileSide + 1);
-    const int shift = dy * kTileSide + dx;
-    for (int c = 0; c < tile.channels; ++c)
-        addDifferences(tile.values(c) + kCorner, tile.values(c) + kCorner + shift,
-                       tile.variances(c) + kCorner, tile.variances(c) + kCorner + shift,
-                       tile.scales(c) + kCorner, tile.scales(c) + kCorner + shift, scratch.data());
-    sumPatches(scratch.data(), 1.f / static_cast<float>(kPatchPixels * tile.channels),
-               scratch.data() + kSpan * kSpan, out, outStride);
+void patchDistances(const PatchTile& tile, int dx, int dy, std::vector<float>& scratch, float* out) {
+    scratch.resize(kSpan * kSpanStride + kPatchScratch);
+    sumDifferences(tile, dy * kTileSide + dx, scratch.data());
+    sumPatches(scratch.data(), kPerPatch, scratch.data() + kSpan * kSpanStride, out);
 }
 
-void patchDistancesFrom(const PatchTile& tile, int column, int row, float* out) {
-    const int here = (row + kTileMargin) * kTileSide + column + kTileMargin;
-    for (int dy = -kMaxReach; dy <= kMaxReach; ++dy)
-        addPatchRow(tile, here, here + dy * kTileSide - kMaxReach,
-                    1.f / static_cast<float>(kPatchPixels * tile.channels),
-                    out + (dy + kMaxReach) * kDistanceStride);
+void patchDistancesFrom(const PatchTile& tile, int column, int row, const Surroundings& around, float* out) {
+    distancesFrom(tile, (row + kTileMargin) * kTileSide + column + kTileMargin, around.reach,
+                  around.stride() / 8, kPerPatch, out);
+}
+
+void latticeDistances(const PatchTile& tile, std::span<PatchLattice* const> lattices,
+                      std::vector<float>& scratch) {
+    scratch.resize(kSpan * kSpanStride);
+    int reach = 0;
+    for (PatchLattice* const lattice : lattices) {
+        reach = std::max(reach, lattice->around.reach);
+        lattice->distances.resize(lattice->columns.size() * lattice->rows.size() *
+                                  static_cast<std::size_t>(lattice->around.size()));
+    }
+    for (int dy = -reach; dy <= reach; ++dy)
+        for (int dx = -reach; dx <= reach; ++dx) {
+            sumDifferences(tile, dy * kTileSide + dx, scratch.data());
+            for (PatchLattice* const lattice : lattices)
+                if (std::max(std::abs(dx), std::abs(dy)) <= lattice->around.reach)
+                    sumLattice(scratch.data(), lattice->columns.data(), lattice->columns.size(),
+                               lattice->rows.data(), lattice->rows.size(), kPerPatch,
+                               lattice->distances.data() + lattice->around.at(dx, dy),
+                               static_cast<std::size_t>(lattice->around.size()));
+        }
 }
 
 }  // namespace vlx
