@@ -44,8 +44,8 @@ struct PrefilterTest : testing::Test {
     void prefilter() {
         for (int y = 0; y < kLines; y += kTile)
             for (int x = 0; x < kColumns; x += kTile)
-                prefilterFeatures(raw, data, kDataPlanes, layout, true, x, y, kColumns, kLines, features,
-                                  residuals);
+                prefilterFeatures(raw, data, kDataPlanes, layout, kMostFeatureReach, x, y, kColumns, kLines,
+                                  features, residuals);
     }
     void giveBack() {
         for (int y = 0; y < kLines; ++y)
@@ -98,10 +98,10 @@ TEST_F(PrefilterTest, AHalfsWeightsAreTheOthers) {
                 raw.row(kFeaturePlanes.error(f), y)[x] = 1e-6f;
             }
     prefilter();
-    constexpr int kX = 40, kY = 30, kSide = 2 * kFeatureReach + 1;
+    constexpr int kX = 40, kY = 30, kSide = 2 * kMostFeatureReach + 1;
     double sum = 0;
-    for (int y = kY - kFeatureReach; y <= kY + kFeatureReach; ++y)
-        for (int x = kX - kFeatureReach; x <= kX + kFeatureReach; ++x)
+    for (int y = kY - kMostFeatureReach; y <= kY + kMostFeatureReach; ++y)
+        for (int x = kX - kMostFeatureReach; x <= kX + kMostFeatureReach; ++x)
             sum += static_cast<double>(raw.row(kFeaturePlanes.value(0), y)[x] +
                                        raw.row(kFeaturePlanes.difference(0), y)[x]);
     // B's weights, from A, move nothing: it has one value.

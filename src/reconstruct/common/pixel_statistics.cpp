@@ -170,17 +170,13 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const Drift& options) 
     return layout;
 }
 
-float saturated(float value) {
-    const float magnitude = std::abs(value);
-    return magnitude > 1 ? std::copysign(1 + std::log(magnitude), value) : value;
-}
-
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
                        int bandRow, double clamp, RowRing& ring, int y) {
     GatherCounts counts;
     const auto radiance = static_cast<std::size_t>(layout.radiance);
     const auto features = static_cast<std::size_t>(layout.features);
-    std::vector<double> first(radiance + features), sum[2], square(radiance + features);
+    std::vector<double> first(radiance + features), sum[2], square(radiance + features), factors;
+    for (auto& s : sum) s.resize(radiance + features);
     const std::size_t alpha = layout.alpha < 0 ? radiance + features : static_cast<std::size_t>(layout.alpha);
     std::vector<std::size_t> taken, halves[2];
     std::vector<std::pair<std::uint64_t, std::size_t>> order;
@@ -219,8 +215,6 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         const auto n = static_cast<double>(taken.size());
         if (taken.empty()) ++counts.empty;
 
-        std::fill(square.begin(), square.end(), 0.0);
-        for (auto& s : sum) s.assign(radiance + features, 0.0);
         double rgb[3] = {}, light = 0, lightSquares = 0;
         std::size_t bright = 0;
         float most = -1, second = -1;
@@ -230,24 +224,19 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
             if (!std::isfinite(v)) return 0.0;
             return static_cast<double>(c < radiance ? v : saturated(v / layout.scale[c - radiance]));
         };
-        for (std::size_t c = 0; c < radiance + features; ++c)
-            first[c] = taken.empty() ? 0 : value(c, taken[0]);
+        factors.clear();
         for (int half = 0; half < 2; ++half)
             for (const std::size_t s : halves[half]) {
                 for (std::size_t c = 0; c < 3; ++c) rgb[c] = value(c, s);
                 const double brightness = luminance(rgb);
                 const double factor = clamp > 0 && brightness > clamp ? clamp / brightness : 1;
+                factors.push_back(factor);
                 counts.luminance += brightness;
                 const double signedLight = luminance(rgb[0], rgb[1], rgb[2]);
                 light += signedLight;
                 lightSquares += signedLight * signedLight;
                 counts.removed += brightness * (1 - factor);
                 counts.limited += factor < 1;
-                for (std::size_t c = 0; c < radiance + features; ++c) {
-                    const double d = value(c, s) * (c < radiance && c != alpha ? factor : 1) - first[c];
-                    sum[half][c] += d;
-                    square[c] += d * d;
-                }
                 const auto l = static_cast<float>(brightness * factor);
                 if (l > most) {
                     second = most;
@@ -258,6 +247,23 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
                     second = std::max(second, l);
                 }
             }
+        for (std::size_t c = 0; c < radiance + features; ++c) {
+            first[c] = taken.empty() ? 0 : value(c, taken[0]);
+            const bool limited = c < radiance && c != alpha;
+            const double* factor = factors.data();
+            double squares = 0;
+            for (int half = 0; half < 2; ++half) {
+                double total = 0;
+                for (const std::size_t s : halves[half]) {
+                    const double d = value(c, s) * (limited ? *factor : 1) - first[c];
+                    ++factor;
+                    total += d;
+                    squares += d * d;
+                }
+                sum[half][c] = total;
+            }
+            square[c] = squares;
+        }
 
         counts.light += light;
         if (n > 1) counts.noise += std::max(0.0, lightSquares - light * light / n) * n / (n - 1);

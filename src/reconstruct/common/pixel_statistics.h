@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -47,7 +48,10 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const Drift& options);
 
 /// What a feature's value counts as, in units of its scale: itself up to 1, and beyond that 1 + ln |x|. A
 /// lamp's albedo of 100 or a sky at depth 1e10 is unlike all else, no more.
-float saturated(float value);
+inline float saturated(float value) {
+    const float magnitude = std::abs(value);
+    return magnitude > 1 ? std::copysign(1 + std::log(magnitude), value) : value;
+}
 
 struct GatherCounts {
     std::int64_t samples = 0, dropped = 0, empty = 0;

@@ -1,9 +1,10 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "reconstruct/drift/pixel_data.h"
+#include "reconstruct/drift/stacking.h"
 
 /// From the models' estimates of the halves to one estimate, with its variance: drift.h, 5.
 namespace vlx {
@@ -37,9 +38,16 @@ class Combination {
 
   private:
     int candidates() const { return static_cast<int>(estimates_.size()); }
-    float estimate(int j, int half, int c, int x, int y) const;
-    double unit(int x, int y) const;
-    void store(int x, int y, const Eigen::VectorXd& weights);
+    /// What is read of one row. estimate[j][half][c]: of a half by candidate j; the last is the half's plain
+    /// mean.
+    struct Rows {
+        std::vector<std::array<std::vector<const float*>, 2>> estimate;
+        std::vector<const float*> leverage, modelVariance[3];  // of models
+        const float *halfCount[2], *count, *variance[3];
+    };
+    Rows rowsOf(int y) const;
+    double unit(const Rows& rows, int x) const;
+    void store(const Rows& rows, int x, const StackingVector& weights, float* const* out) const;
 
     DataPlanes planes_;
     ModelPlanes models_;

@@ -6,8 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "base/simd.h"
-#include "reconstruct/drift/prefilter.h"
+#include "reconstruct/common/window_sum.h"
 #include "reconstruct/drift/stacking.h"
 
 namespace vlx {
@@ -127,6 +126,8 @@ void Finishing::cleanRow(int y) {
 
 void Finishing::errorRow(int y) {
     Light::Row row(width_);
+    const auto w = static_cast<std::size_t>(width_);
+    const std::vector<float> sums = sharedVariances(y);
     std::vector<float> unexplained(static_cast<std::size_t>(width_)), known(unexplained.size());
     for (int x = 0; x < width_; ++x) {
         const double n = data_.row(planes_.count(), y)[x];
@@ -135,7 +136,9 @@ void Finishing::errorRow(int y) {
             data_.row(planes_.halfCount(0), y)[x] > 0 && data_.row(planes_.halfCount(1), y)[x] > 0;
         const bool exact = isExact(x, y);
         double shared[3], inCommon[3];
-        sharedVariance(x, y, shared);
+        for (std::size_t c = 0; c < 3; ++c)
+            shared[c] = static_cast<double>(sums[c * w + static_cast<std::size_t>(x)]) /
+                        static_cast<double>(sums[3 * w + static_cast<std::size_t>(x)]);
         for (int c = 0; c < 3; ++c) {
             // The noise of the halves' common data is estimated twice, by what the halves differ in and by
             // the kriging variance: half of each.
@@ -263,34 +266,23 @@ bool Finishing::isExact(int x, int y) const {
     return true;
 }
 
-/// How alike the features of two pixels are, 0 to 1.
-float Finishing::likeness(int x, int y, int col, int row) const {
-    float d = 0;
-    for (int f = 0; f < layout_.features; ++f) {
-        const float apart = features_.row(f, row)[col] - features_.row(f, y)[x];
-        d += apart * apart /
-             (kAlikeFeatures2 + 2 * features_.row(FeaturePlanes{layout_.features}.error(f), y)[x]);
-    }
-    return simd::nearExp(d);
-}
-
-/// Variance of R, G, B of the mean of the two halves' estimates, from their difference, over the pixels of
-/// alike features around.
-void Finishing::sharedVariance(int x, int y, double* variance) const {
-    double total = 0;
-    std::fill_n(variance, 3, 0.0);
-    for (int row = std::max(0, y - kAlikeReach); row <= std::min(height_ - 1, y + kAlikeReach); ++row)
-        for (int col = std::max(0, x - kAlikeReach); col <= std::min(width_ - 1, x + kAlikeReach); ++col) {
-            const auto alike = static_cast<double>(likeness(x, y, col, row));
-            if (alike == 0) continue;
-            total += alike;
-            for (int c = 0; c < 3; ++c) {
-                const double d = static_cast<double>(combined_.row(combinedPlanes_.half(0) + c, row)[col]) -
-                                 static_cast<double>(combined_.row(combinedPlanes_.half(1) + c, row)[col]);
-                variance[c] += alike * d * d / 4;
+/// Variances of R, G, B of the mean of the two halves' estimates, from their differences, over the pixels of
+/// alike features around each pixel of row y: three rows, and one of weights.
+std::vector<float> Finishing::sharedVariances(int y) const {
+    std::vector<float> sums(4 * static_cast<std::size_t>(width_));
+    sumAlike(
+        features_, layout_.features, kAlikeReach, 4,
+        [&](int row, int c, float* q) {
+            if (c == 3) {
+                std::fill_n(q, width_, 1.f);
+                return;
             }
-        }
-    for (int c = 0; c < 3; ++c) variance[c] /= total;
+            const float* const a = combined_.row(combinedPlanes_.half(0) + c, row);
+            const float* const b = combined_.row(combinedPlanes_.half(1) + c, row);
+            for (int x = 0; x < width_; ++x) q[x] = (a[x] - b[x]) * (a[x] - b[x]) / 4;
+        },
+        y, width_, height_, sums.data());
+    return sums;
 }
 
 }  // namespace vlx

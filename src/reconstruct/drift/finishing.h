@@ -44,8 +44,7 @@ class Finishing {
   private:
     double sampleVariance(int c, int x, int y) const;
     bool isExact(int x, int y) const;
-    float likeness(int x, int y, int col, int row) const;
-    void sharedVariance(int x, int y, double* variance) const;
+    std::vector<float> sharedVariances(int y) const;
     double meanVariance(int c, int x, int y) const;
     double gapVariance(int c, int x, int y) const;
     std::optional<double> commonError(int x, int y, const double* predicted) const;

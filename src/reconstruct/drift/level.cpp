@@ -10,26 +10,32 @@ namespace vlx {
 namespace {
 
 // Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them. With
-// tiles of 32 rows, centres that reach 15, patches that reach 3 and windows that reach 11, data are filled
-// 252 rows ahead of the row that is combined (measured over bands of tall pictures; builds with assertions
-// notice where it is more); the others are used up earlier.
-constexpr int kDataRows = 256;
-constexpr int kRawRows = 160;       // and squares
-constexpr int kResidualRows = 96;   // a tile's, and kReturnReach around
-constexpr int kFeatureRows = 208;   // finishing looks back at them
-constexpr int kVarianceRows = 160;  // and at these
-constexpr int kSumRows = 128;
-constexpr int kEstimateRows = 64;  // and moments
-constexpr int kCombinedRows = 96;
+// tiles of 32 rows, centres that reach 15, patches that reach 3 and windows that reach 11, each is what was
+// seen over heights, bands and scales of tall pictures, and 8 more; builds with assertions notice where it
+// is more.
+struct PixelRowCounts {
+    int data, squares, raw;
+};
+constexpr PixelRowCounts kPixelRows{216, 160, 96};
+constexpr PixelRowCounts kLeadingRows{392, 256, 280};  // of a level whose source another one drives ahead
+constexpr int kResidualRows = 64;                      // a tile's, and kReturnReach around
+constexpr int kFeatureRows = 200;                      // finishing looks back at them
+constexpr int kVarianceRows = 156;                     // and at these
+constexpr int kSumRows = 72;
+constexpr int kEstimateRows = 100;  // and moments
+constexpr int kCombinedRows = 88;
+
+const PixelRowCounts& rowsOf(bool driven) { return driven ? kLeadingRows : kPixelRows; }
 
 }  // namespace
 
-Level::Level(const SampleLayout& layout, const DriftSteps& steps, std::vector<NeighbourhoodModel> models,
-             int width, int height, int ahead, const PictureScale& picture, Source source,
-             DriftReport& report, StageClock& clock)
+Level::Level(const SampleLayout& layout, const DriftSteps& steps, const LevelPlan& plan, int width,
+             int height, bool driven, const PictureScale& picture, Source source, DriftReport& report,
+             StageClock& clock)
     : layout_(layout),
       steps_(steps),
-      models_(std::move(models)),
+      featureReach_(steps.prefilter ? plan.featureReach : 0),
+      models_(plan.models),
       width_(width),
       height_(height),
       radiance_(layout.radiance),
@@ -37,9 +43,9 @@ Level::Level(const SampleLayout& layout, const DriftSteps& steps, std::vector<Ne
       source_(std::move(source)),
       report_(report),
       clock_(clock),
-      pixels_{RowRing(width, DataPlanes{radiance_}.channels(), kept(kDataRows + ahead)),
-              RowRing(width, SquaresPlanes::kChannels, kept(kRawRows + ahead)),
-              RowRing(width, FeaturePlanes{layout.features}.rawChannels(), kept(kRawRows + ahead))},
+      pixels_{RowRing(width, DataPlanes{radiance_}.channels(), kept(rowsOf(driven).data)),
+              RowRing(width, SquaresPlanes::kChannels, kept(rowsOf(driven).squares)),
+              RowRing(width, FeaturePlanes{layout.features}.rawChannels(), kept(rowsOf(driven).raw))},
       features_(width, FeaturePlanes{layout.features}.channels(), kept(kFeatureRows)),
       residuals_(width, ResidualPlanes{layout.groups}.channels(), kept(kResidualRows)),
       variances_(width, VariancePlanes::kChannels, kept(kVarianceRows)),
@@ -84,7 +90,7 @@ void Level::prefilter(int until) {
             const int y = prefilteredRows_;
             source_(y + kTile + kTileMargin);
             parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
-                prefilterFeatures(pixels_.raw, pixels_.data, {radiance_}, layout_, steps_.prefilter,
+                prefilterFeatures(pixels_.raw, pixels_.data, {radiance_}, layout_, featureReach_,
                                   static_cast<int>(tile) * kTile, y, width_, height_, features_, residuals_);
             });
             prefilteredRows_ = std::min(height_, y + kTile);
@@ -143,14 +149,15 @@ void Level::krige(int until) {
         }
         krigedRows_ = std::min(height_, krigedRows_ + kTile);
         clock_.addTo("kriging");
+        finish();
     }
 }
 
-/// Each model's estimates, and the moments of stacking.
-void Level::finish(int until) {
-    until = std::min(until, height_);
+/// Each model's estimates, and the moments of stacking, of rows that no neighbourhood reaches any more: sums
+/// are kept no longer than they grow.
+void Level::finish() {
+    const int until = krigedRows_ == height_ ? height_ : krigedRows_ - kMaxReach;
     if (finishedRows_ >= until) return;
-    krige(until + kMaxReach);
     parallelFor(finishedRows_, until, [&](std::int64_t y) {
         for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
         fillGaps(static_cast<int>(y));
@@ -231,7 +238,7 @@ void Level::combine(int until) {
     until = std::min(until, height_);
     while (combinedRows_ < until) {  // few rows at a time: the rings hold no more
         const int end = std::min(until, combinedRows_ + kTile);
-        finish(end + kStackReach);
+        krige(end + kStackReach + kMaxReach);
         parallelFor(combinedRows_, end,
                     [&](std::int64_t y) { combination_.combineRow(static_cast<int>(y), steps_.stacking); });
         combinedRows_ = end;

@@ -24,16 +24,21 @@ struct LevelRows {
     const RowRing& combined;   ///< CombinedPlanes
 };
 
+/// What a quality asks of a level.
+struct LevelPlan {
+    std::vector<NeighbourhoodModel> models;
+    int featureReach;  ///< of prefilterFeatures()
+};
+
 /// Stages, each a ring of rows that is filled just ahead of what the next one needs.
 class Level {
   public:
     /// What fills pixels() up to (not including) a row, which may lie below the picture.
     using Source = std::function<void(int until)>;
 
-    /// `ahead`: rows that the source may fill beyond what this level asks for.
-    Level(const SampleLayout& layout, const DriftSteps& steps, std::vector<NeighbourhoodModel> models,
-          int width, int height, int ahead, const PictureScale& picture, Source source, DriftReport& report,
-          StageClock& clock);
+    /// `driven`: another level asks the source for rows as well, and earlier.
+    Level(const SampleLayout& layout, const DriftSteps& steps, const LevelPlan& plan, int width, int height,
+          bool driven, const PictureScale& picture, Source source, DriftReport& report, StageClock& clock);
     Level(const Level&) = delete;
     Level& operator=(const Level&) = delete;
 
@@ -55,12 +60,13 @@ class Level {
     void prefilter(int until);
     void smooth(int until);
     void krige(int until);
-    void finish(int until);
+    void finish();
     void finishRow(std::size_t m, int y);
     void fillGaps(int y);
 
     const SampleLayout& layout_;
     DriftSteps steps_;
+    int featureReach_;
     std::vector<NeighbourhoodModel> models_;
     int width_, height_, radiance_;
     const PictureScale& picture_;

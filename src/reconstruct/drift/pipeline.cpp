@@ -11,6 +11,7 @@
 #include "reconstruct/drift/half_resolution.h"
 #include "reconstruct/drift/level.h"
 #include "reconstruct/drift/pixel_data.h"
+#include "reconstruct/drift/prefilter.h"
 #include "reconstruct/drift/residual_field.h"
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
@@ -24,28 +25,26 @@ namespace {
 constexpr int kReadRows = 16;
 constexpr int kFilledRows = 32;  // pixels of data filled at a time
 // Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them.
-constexpr int kGatheredRows = 96;   // those filled, 11 around them, and those read at a time
-constexpr int kAheadRows = 128;     // that the coarse level makes the fine one's data run ahead
-constexpr int kCorrectedRows = 96;  // and differences
-constexpr int kFinishingRows = 96;  // of 32 that go out together, and the light around them
+constexpr int kGatheredRows = 64;   // those filled, 11 around them, and those read at a time
+constexpr int kCorrectedRows = 88;  // and differences
+constexpr int kFinishingRows = 72;  // of 32 that go out together, and the light around them
 
 // What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries
 // that it maps, and each thread's tiles.
 constexpr std::uint64_t kProcessBytes = 150'000'000;
 constexpr std::uint64_t kThreadBytes = 8'000'000;
 
-/// Of a level.
-std::vector<NeighbourhoodModel> modelsOf(Quality quality, bool coarse) {
+LevelPlan planOf(Quality quality, bool coarse) {
     switch (quality) {
         case Quality::Draft:
-            return {{8, 0.8f, 6, true}};
+            return {{{8, 0.8f, 6, true}}, 3};
         case Quality::Standard:
             break;
         case Quality::High:
-            return {{8, 0.8f, 2, true}, {15, 3.f, 6, false}, {4, 1.f, 2, false}};
+            return {{{8, 0.8f, 2, true}, {15, 3.f, 6, false}, {4, 1.f, 2, false}}, kMostFeatureReach};
     }
-    if (coarse) return {{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}};
-    return {{8, 0.8f, 4, true}, {15, 3.f, 8, false}, {4, 1.f, 3, false}};
+    if (coarse) return {{{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}}, kMostFeatureReach};
+    return {{{8, 0.8f, 4, true}, {15, 3.f, 8, false}, {4, 1.f, 3, false}}, kMostFeatureReach};
 }
 
 Window scaled(const Window& window, int scale) {
@@ -85,8 +84,8 @@ class Pipeline {
           picture_(measurePictureScale(dump, layout_)),
           gathered_(width_, planes_.channels(), kept(kGatheredRows)),
           fine_(
-              layout_, options.steps, modelsOf(options.quality, false), width_, height_,
-              halved_ ? kAheadRows : 0, picture_, [this](int until) { fill(until); }, drift_, clock_),
+              layout_, options.steps, planOf(options.quality, false), width_, height_, halved_, picture_,
+              [this](int until) { fill(until); }, drift_, clock_),
           pixels_(dump, layout_, planes_, picture_, options.scale, width_, height_,
                   options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
           differences_(width_, halved_ ? DifferencePlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
@@ -98,8 +97,8 @@ class Pipeline {
                      clean_, light_, common_) {
         if (halved_) {
             coarse_ = std::make_unique<Level>(
-                layout_, options.steps, modelsOf(options.quality, true), (width_ + 1) / 2, (height_ + 1) / 2,
-                kAheadRows, picture_, [this](int until) { fill(2 * until); }, drift_, clock_);
+                layout_, options.steps, planOf(options.quality, true), (width_ + 1) / 2, (height_ + 1) / 2, 0,
+                picture_, [this](int until) { fill(2 * until); }, drift_, clock_);
             fine_.lookAt(*coarse_);
             correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
                                                        corrected_);

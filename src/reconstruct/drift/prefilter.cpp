@@ -10,57 +10,13 @@ namespace vlx {
 
 namespace {
 
+using simd::Eight;
+using simd::load;
+using simd::store;
+
 constexpr float kFeatureFloor = 1e-6f;  // differences of a thousandth of a feature's scale are none
 // Standard errors by which residuals that both halves show must exceed chance; every window is looked at.
 constexpr float kReturnSignificance = 3;
-
-/// weights[i] = simd::nearExp(max(0, d[i])), summed into `total`, and into sums of each value and variance.
-VLX_WIDE void accumulate(const float* __restrict distances, int count, const float* const* values,
-                         const float* const* variances, int channels, float* __restrict weights,
-                         float* __restrict total, float* const* sums, float* const* squares) {
-    for (int i = 0; i < count; ++i) {
-        const float w = simd::nearExp(distances[i] > 0 ? distances[i] : 0.f);
-        weights[i] = w;
-        total[i] += w;
-    }
-    for (int c = 0; c < channels; ++c) {
-        const float* __restrict z = values[c];
-        const float* __restrict v = variances[c];
-        float* __restrict s = sums[c];
-        float* __restrict q = squares[c];
-        for (int i = 0; i < count; ++i) {
-            s[i] += weights[i] * z[i];
-            q[i] += weights[i] * weights[i] * v[i];
-        }
-    }
-}
-
-VLX_WIDE void addWeighted(const float* const* there, const float* const* here, const float* const* scale,
-                          int features, const float* const* squares, int first, int last, int dx,
-                          float* __restrict weights, float* const* sums) {
-    for (int i = first; i < last; ++i) weights[i] = 0;
-    for (int f = 0; f < features; ++f) {
-        const float* __restrict a = there[f];
-        const float* __restrict b = here[f];
-        const float* __restrict s = scale[f];
-        for (int i = first; i < last; ++i) {
-            const float d = a[i + dx] - b[i];
-            weights[i] += d * d * s[i];
-        }
-    }
-    for (int i = first; i < last; ++i) weights[i] = simd::nearExp(weights[i]);
-    for (int c = 0; c < SquaresPlanes::kChannels; ++c) {
-        const float* __restrict q = squares[c];
-        float* __restrict s = sums[c];
-        for (int i = first; i < last; ++i) s[i] += weights[i] * q[i + dx];
-    }
-}
-
-/// F sum w T^2 / (sum w T)^2; 0 where nothing scatters, or so much that squares of it are no numbers.
-double rarityOf(double scatter, double squares, double freedom) {
-    const double rarity = freedom * squares / (scatter * scatter);
-    return scatter > 0 && std::isfinite(rarity) ? rarity : 0;
-}
 
 /// Of a tile: sums of weights, and of what is weighted and its variance.
 class WeightedSums {
@@ -74,16 +30,72 @@ class WeightedSums {
     std::vector<float> sums_;
 };
 
+/// What the pixels (dx, dy) away add to the sums of a tile: w, w z and w^2 v of each channel, w =
+/// nearExp(max(0, distance)), 0 where `inside`, of columns from the tile's first, says that there is none;
+/// none lies outside the rows `top` to `bottom`.
+template <int Channels>
+[[gnu::always_inline]] inline void accumulate(const PatchTile& half, int dx, int dy, const float* distances,
+                                              const float* inside, int top, int bottom, WeightedSums& sums) {
+    for (int row = std::max(0, top - dy); row < std::min(kTile, bottom - dy); ++row)
+        for (int column = 0; column < kTile; column += 8) {
+            const int here = row * kTile + column;
+            const int there = (row + dy + kTileMargin) * kTileSide + column + dx + kTileMargin;
+            const Eight weight = simd::nearExp(simd::maximum(load<Eight>(distances + here), Eight{})) *
+                                 load<Eight>(inside + column + dx);
+            const auto add = [&](float* to, Eight value) {
+                store(to + here, load<Eight>(to + here) + value);
+            };
+            add(sums.total(), weight);
+            for (int c = 0; c < Channels; ++c) {
+                add(sums.value(c), weight * load<Eight>(half.values(c) + there));
+                add(sums.variance(c), weight * weight * load<Eight>(half.variances(c) + there));
+            }
+        }
+}
+
+VLX_WIDE void accumulate(const PatchTile& half, int dx, int dy, const float* distances, const float* inside,
+                         int top, int bottom, WeightedSums& sums) {
+    switch (half.channels) {
+        case 1:
+            return accumulate<1>(half, dx, dy, distances, inside, top, bottom, sums);
+        case 2:
+            return accumulate<2>(half, dx, dy, distances, inside, top, bottom, sums);
+        default:
+            return accumulate<3>(half, dx, dy, distances, inside, top, bottom, sums);
+    }
+}
+
+/// F sum w T^2 / (sum w T)^2; 0 where nothing scatters, or so much that squares of it are no numbers.
+double rarityOf(double scatter, double squares, double freedom) {
+    const double rarity = freedom * squares / (scatter * scatter);
+    return scatter > 0 && std::isfinite(rarity) ? rarity : 0;
+}
+
+/// out = the mean of each value and of the up to eight around it.
+void averageAround(const std::vector<float>& in, std::vector<float>& out) {
+    constexpr int kSide = kTileSide;
+    float column[kSide];
+    for (int row = 0; row < kSide; ++row) {
+        const int top = std::max(0, row - 1), rows = std::min(kSide - 1, row + 1) - top + 1;
+        std::copy_n(in.data() + top * kSide, kSide, column);
+        for (int r = 1; r < rows; ++r)
+            for (int i = 0; i < kSide; ++i) column[i] += in[static_cast<std::size_t>((top + r) * kSide + i)];
+        float* const to = out.data() + row * kSide;
+        const float three = 1.f / static_cast<float>(3 * rows), two = 1.f / static_cast<float>(2 * rows);
+        for (int i = 1; i < kSide - 1; ++i) to[i] = (column[i - 1] + column[i] + column[i + 1]) * three;
+        to[0] = (column[0] + column[1]) * two;
+        to[kSide - 1] = (column[kSide - 2] + column[kSide - 1]) * two;
+    }
+}
+
 /// The features [first, first + channels) of a tile as each half has them: twice the error variance of both,
 /// averaged with that of the 3 x 3 pixels around; a pixel of one sample is its own in both. Whether any has
 /// noise.
 bool splitFeatures(const RowRing& raw, const FeaturePlanes& planes, int first, int channels,
                    const std::vector<float>& counts, int width, int height, PatchTile* halves) {
-    std::vector<float> value(kTileSide * kTileSide), error(value.size()), difference(value.size());
-    bool noisy = false;
-    for (int h = 0; h < 2; ++h) {
-        halves[h].resize(channels);
-    }
+    std::vector<float> value(kTileSide * kTileSide), error(value.size()), difference(value.size()),
+        around(value.size());
+    for (int h = 0; h < 2; ++h) halves[h].resize(channels);
     for (int c = 0; c < channels; ++c) {
         const auto copy = [&](int plane, std::vector<float>& out) {
             copyTile(raw, plane, halves[0].x, halves[0].y, width, height, out.data());
@@ -91,26 +103,18 @@ bool splitFeatures(const RowRing& raw, const FeaturePlanes& planes, int first, i
         copy(planes.value(first + c), value);
         copy(planes.error(first + c), error);
         copy(planes.difference(first + c), difference);
-        for (int row = 0; row < kTileSide; ++row)
-            for (int i = 0; i < kTileSide; ++i) {
-                float sum = 0;
-                int count = 0;
-                for (int r = std::max(0, row - 1); r <= std::min(kTileSide - 1, row + 1); ++r)
-                    for (int k = std::max(0, i - 1); k <= std::min(kTileSide - 1, i + 1); ++k) {
-                        sum += error[static_cast<std::size_t>(r * kTileSide + k)];
-                        ++count;
-                    }
-                const auto at = static_cast<std::size_t>(row * kTileSide + i);
-                const float both = 0.5f * (error[at] + sum / static_cast<float>(count));
-                noisy = noisy || error[at] > 0;
-                for (int h = 0; h < 2; ++h) {
-                    halves[h].values(c)[at] = value[at] + (h == 0 ? difference[at] : -difference[at]);
-                    halves[h].variances(c)[at] = counts[at] <= 1 ? both : 2 * both;
-                }
+        averageAround(error, around);
+        for (int h = 0; h < 2; ++h) {
+            float *const values = halves[h].values(c), *const variances = halves[h].variances(c);
+            const float sign = h == 0 ? 1.f : -1.f;
+            for (std::size_t i = 0; i < value.size(); ++i) {
+                values[i] = value[i] + sign * difference[i];
+                variances[i] = (counts[i] <= 1 ? 0.5f : 1.f) * (error[i] + around[i]);
             }
+        }
     }
     for (int h = 0; h < 2; ++h) halves[h].setScale(kFeatureFloor);
-    return noisy;
+    return std::any_of(halves[0].noise.begin(), halves[0].noise.end(), [](float v) { return v > 0; });
 }
 
 VLX_WIDE void addResiduals(const float* __restrict products, const float* __restrict squares, float weight,
@@ -126,7 +130,7 @@ VLX_WIDE void addResiduals(const float* __restrict products, const float* __rest
 }  // namespace
 
 void prefilterFeatures(const RowRing& raw, const RowRing& data, const DataPlanes& dataPlanes,
-                       const SampleLayout& layout, bool clean, int x, int y, int width, int height,
+                       const SampleLayout& layout, int reach, int x, int y, int width, int height,
                        RowRing& features, RowRing& residuals) {
     const int right = std::min(width, x + kTile), bottom = std::min(height, y + kTile);
     const FeaturePlanes planes{layout.features};
@@ -136,37 +140,27 @@ void prefilterFeatures(const RowRing& raw, const RowRing& data, const DataPlanes
         half.x = x;
         half.y = y;
     }
-    std::vector<float> counts(kTileSide * kTileSide), scratch, distances(kTile * kTile), weights(kTile);
+    std::vector<float> counts(kTileSide * kTileSide), scratch, distances(kTile * kTile),
+        inside(kTile + 2 * kMostFeatureReach);
     copyTile(data, dataPlanes.count(), x, y, width, height, counts.data());
+    for (int i = 0; i < kTile + 2 * kMostFeatureReach; ++i) {
+        const int column = x + i - kMostFeatureReach;
+        inside[static_cast<std::size_t>(i)] = column >= 0 && column < width ? 1 : 0;
+    }
     for (int first = 0; first < layout.features;) {
         const int group = layout.group[static_cast<std::size_t>(first)];
         int last = first;
         while (last < layout.features && layout.group[static_cast<std::size_t>(last)] == group) ++last;
         const int channels = last - first;
         const bool noisy =
-            splitFeatures(raw, planes, first, channels, counts, width, height, halves) && clean;
+            splitFeatures(raw, planes, first, channels, counts, width, height, halves) && reach > 0;
         WeightedSums sums[2] = {WeightedSums(channels), WeightedSums(channels)};
-        for (int dy = -kFeatureReach; noisy && dy <= kFeatureReach; ++dy)
-            for (int dx = -kFeatureReach; dx <= kFeatureReach; ++dx)
+        for (int dy = -reach; noisy && dy <= reach; ++dy)
+            for (int dx = -reach; dx <= reach; ++dx)
                 for (int h = 0; h < 2; ++h) {
                     patchDistances(halves[1 - h], dx, dy, scratch, distances.data());
-                    for (int row = std::max(y, -dy); row < std::min(bottom, height - dy); ++row) {
-                        const int begin = std::max(x, -dx), end = std::min(right, width - dx);
-                        if (begin >= end) continue;
-                        const int at = (row - y) * kTile + begin - x;
-                        const int there =
-                            (row - y + kTileMargin + dy) * kTileSide + begin - x + kTileMargin + dx;
-                        const float *values[3] = {}, *variances[3] = {};
-                        float *s[3] = {}, *q[3] = {};
-                        for (int c = 0; c < channels; ++c) {
-                            values[c] = halves[h].values(c) + there;
-                            variances[c] = halves[h].variances(c) + there;
-                            s[c] = sums[h].value(c) + at;
-                            q[c] = sums[h].variance(c) + at;
-                        }
-                        accumulate(distances.data() + at, end - begin, values, variances, channels,
-                                   weights.data(), sums[h].total() + at, s, q);
-                    }
+                    accumulate(halves[h], dx, dy, distances.data(), inside.data() + kMostFeatureReach, -y,
+                               height - y, sums[h]);
                 }
         for (int row = y; row < bottom; ++row)
             for (int col = x; col < right; ++col) {
@@ -235,27 +229,16 @@ void returnResiduals(const RowRing& raw, const RowRing& residuals, const SampleL
 void smoothVariances(const RowRing& squares, const RowRing& data, const DataPlanes& planes,
                      const RowRing& features, int featureCount, const PictureScale& picture, bool unseen,
                      const RowRing* wide, int y, int width, int height, RowRing& variances) {
-    const auto count = static_cast<std::size_t>(featureCount), w = static_cast<std::size_t>(width);
-    std::vector<float> scales(count * w), sums(SquaresPlanes::kChannels * w), weights(w);
-    std::vector<const float*> here(count), there(count), scale(count);
-    for (std::size_t f = 0; f < count; ++f) {
-        here[f] = features.row(static_cast<int>(f), y);
-        const float* errors = features.row(FeaturePlanes{featureCount}.error(static_cast<int>(f)), y);
-        for (std::size_t i = 0; i < w; ++i) scales[f * w + i] = 1 / (kAlikeFeatures2 + 2 * errors[i]);
-        scale[f] = scales.data() + f * w;
-    }
-    float* out[SquaresPlanes::kChannels];
-    for (std::size_t c = 0; c < SquaresPlanes::kChannels; ++c) out[c] = sums.data() + c * w;
-    for (int row = std::max(0, y - kVarianceReach); row <= std::min(height - 1, y + kVarianceReach); ++row) {
-        for (std::size_t f = 0; f < count; ++f) there[f] = features.row(static_cast<int>(f), row);
-        const float* in[SquaresPlanes::kChannels];
-        for (int c = 0; c < SquaresPlanes::kChannels; ++c) in[c] = squares.row(c, row);
-        for (int dx = -kVarianceReach; dx <= kVarianceReach; ++dx)
-            addWeighted(there.data(), here.data(), scale.data(), featureCount, in, std::max(0, -dx),
-                        std::min(width, width - dx), dx, weights.data(), out);
-    }
+    const auto w = static_cast<std::size_t>(width);
+    std::vector<float> sums(SquaresPlanes::kChannels * w);
+    sumAlike(
+        features, featureCount, kVarianceReach, SquaresPlanes::kChannels,
+        [&](int row, int c, float* q) { std::copy_n(squares.row(c, row), w, q); }, y, width, height,
+        sums.data());
     for (std::size_t i = 0; i < w; ++i) {
-        const auto sum = [&](int plane) { return static_cast<double>(out[plane][i]); };
+        const auto sum = [&](int plane) {
+            return static_cast<double>(sums[static_cast<std::size_t>(plane) * w + i]);
+        };
         const auto around = [&](int plane) { return static_cast<double>(wide->row(plane, y / 2)[i / 2]); };
         const double freedom = sum(SquaresPlanes::kFreedom);
         variances.row(VariancePlanes::kRarity, y)[i] = static_cast<float>(

@@ -8,12 +8,9 @@
 /// What kriging needs besides the means: features without noise, error variances without noise or bias.
 namespace vlx {
 
-/// Square of the difference that makes pixels unlike where error variances are pooled: a tenth of a feature's
-/// scale.
-inline constexpr float kAlikeFeatures2 = 0.01f;
-inline constexpr int kFeatureReach = 5;   ///< pixels around a pixel that its features are averaged over
-inline constexpr int kVarianceReach = 5;  ///< and its error variance
-inline constexpr int kReturnReach = 11;   ///< that tell what smoothing its features took away
+inline constexpr int kMostFeatureReach = 5;  ///< pixels around a pixel that its features are averaged over
+inline constexpr int kVarianceReach = 5;     ///< and its error variance
+inline constexpr int kReturnReach = 11;      ///< that tell what smoothing its features took away
 
 /// Prefilters the features (FeaturePlanes, as `features`) of the rows [y, y + kTile) at columns
 /// [x, x + kTile) (cut to the image): non-local means in each group of each half f_h, with weights exp(-d),
@@ -21,10 +18,11 @@ inline constexpr int kReturnReach = 11;   ///< that tell what smoothing its feat
 ///     F_h = sum w f_h / sum w,    F = (F_A + F_B) / 2,    u = (U_A + U_B) / 4,
 ///     U_h = sum w^2 u_h / (sum w)^2.
 /// The error variances u_h are averaged with those of the 3 x 3 pixels around. A pixel of one sample is
-/// the same in both: it steers its own weights, and u = (U_A + U_B) / 2. A group without
-/// noise is copied; not `clean`: all are. Writes ResidualPlanes too (0 of pixels of one sample).
+/// the same in both: it steers its own weights, and u = (U_A + U_B) / 2. A tile whose group has no
+/// noise is copied; with `reach`, at most kMostFeatureReach pixels around, of 0 all are. Writes
+/// ResidualPlanes too (0 of pixels of one sample).
 void prefilterFeatures(const RowRing& raw, const RowRing& data, const DataPlanes& dataPlanes,
-                       const SampleLayout& layout, bool clean, int x, int y, int width, int height,
+                       const SampleLayout& layout, int reach, int x, int y, int width, int height,
                        RowRing& features, RowRing& residuals);
 
 /// Gives back to the prefiltered features of row y what both halves show of what was taken off, r = f - F:

@@ -8,13 +8,13 @@ double shrinkage(double apart, double variance) {
     return apart > variance && apart > 0 ? 1 - variance / apart : 0;
 }
 
-Eigen::VectorXd stackingWeights(const StackingMoments& moments, const Eigen::VectorXd& significance) {
+StackingVector stackingWeights(const StackingMoments& moments, const StackingVector& significance) {
     constexpr int kRounds = 30;
     constexpr double kLeastMove = 1e-4;  // no pixel shows less
     constexpr double kRidge = 1;  // in units of noise: differences below one standard error decide nothing
     const Eigen::Index m = moments.agreement.size();
-    Eigen::VectorXd weights = Eigen::VectorXd::Zero(m);
-    const Eigen::VectorXd agreement = moments.agreement - significance.cwiseProduct(moments.standardError);
+    StackingVector weights = StackingVector::Zero(m);
+    const StackingVector agreement = moments.agreement - significance.cwiseProduct(moments.standardError);
     bool moved = true;
     for (int round = 0; round < kRounds && moved; ++round) {
         moved = false;
