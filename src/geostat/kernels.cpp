@@ -83,6 +83,8 @@ template <class T, int bytes>
     return lowest;
 }
 
+constexpr Index kChunk = 128;  // values at a time
+
 struct Columns {
     const ModelColumns::Structure* structures;
     std::size_t count;
@@ -94,22 +96,55 @@ struct Columns {
     double* out;
 };
 
+/// out += sill * value of the model at squared distances. The elementary functions of a stable structure one
+/// after the other over all of them: their chains of dependent operations then overlap.
+template <class V>
+[[gnu::always_inline]] inline void addStable(const ModelColumns::Structure& s, const double* squared, Index n,
+                                             bool semivariance, double* out) {
+    alignas(64) double x[kChunk];
+    const double half = s.halfShape;
+    if (half == 1) {  // Gaussian: no power to take
+        for (Index i = 0; i < n; i += kLanes<V>) store(x + i, load<V>(squared + i) * s.inverseSquaredRange);
+    } else {
+        for (Index i = 0; i < n; i += kLanes<V>)
+            store(x + i, powerLogarithm(load<V>(squared + i) * s.inverseSquaredRange, spread<V>(half)));
+        for (Index i = 0; i < n; i += kLanes<V>)
+            store(x + i, powerOfTwo(load<V>(squared + i) * s.inverseSquaredRange, load<V>(x + i)));
+    }
+    for (Index i = 0; i < n; i += kLanes<V>) {
+        const V value = load<V>(x + i);
+        store(out + i, load<V>(out + i) + s.sill * (semivariance ? decayComplement(value) : decay(value)));
+    }
+}
+
 template <int bytes>
 [[gnu::always_inline]] inline void columnsBody(const Columns& c) {
     using V = typename Vectors<double, bytes>::Type;
-    for (Index i = c.first / kLanes<V> * kLanes<V>; i < c.last; i += kLanes<V>) {
-        V squared{};
-        for (Index axis = 0; axis < c.axes; ++axis) {
-            const V d = load<V>(c.places + axis * c.leading + i) - c.point[axis];
-            squared += d * d;
+    alignas(64) double squared[kChunk];
+    for (Index begin = c.first / kLanes<V> * kLanes<V>; begin < c.last; begin += kChunk) {
+        const Index n = std::min(kChunk, c.last - begin);
+        double* out = c.out + begin;
+        for (Index i = 0; i < n; i += kLanes<V>) {
+            V sum{};
+            for (Index axis = 0; axis < c.axes; ++axis) {
+                const V d = load<V>(c.places + axis * c.leading + begin + i) - c.point[axis];
+                sum += d * d;
+            }
+            store(squared + i, sum);
+            store(out + i, V{});
         }
-        V sum{};
         for (std::size_t k = 0; k < c.count; ++k) {
             const ModelColumns::Structure& s = c.structures[k];
-            sum += s.sill * structureValue<V>(s.type, squared * s.inverseSquaredRange, spread<V>(s.halfShape),
-                                              s.halfShape, c.semivariance);
+            if (s.type == StructureType::Stable) {
+                addStable<V>(s, squared, n, c.semivariance, out);
+                continue;
+            }
+            for (Index i = 0; i < n; i += kLanes<V>)
+                store(out + i,
+                      load<V>(out + i) +
+                          s.sill * structureValue<V>(s.type, load<V>(squared + i) * s.inverseSquaredRange,
+                                                     spread<V>(s.halfShape), s.halfShape, c.semivariance));
         }
-        store(c.out + i, sum);
     }
 }
 
