@@ -7,9 +7,24 @@
 #include "geostat/structure_kernel.h"
 
 namespace vlx::kernels {
-namespace {
 
 using Eigen::Index;
+
+/// Arguments of the loops over places.
+struct ModelColumns::Columns {
+    const ModelColumns::Structure* structures;
+    std::size_t count;
+    const double* places;
+    Index leading, axes;
+    const double* points;  // axis-major, `pointsLeading` an axis; the last `commonAxes` of all are the same
+    Index pointsLeading, pointCount, commonAxes;
+    const double* weights;  // of the points; null: 1
+    Index first, last;
+    bool semivariance;
+    double* out;
+};
+
+namespace {
 
 /// Left-looking by blocks of four columns; two vectors of rows at a time, so that eight sums stay in
 /// registers.
@@ -85,22 +100,11 @@ template <class T, int bytes>
 
 constexpr Index kChunk = 128;  // values at a time
 
-struct Columns {
-    const ModelColumns::Structure* structures;
-    std::size_t count;
-    const double* places;
-    Index leading, axes;
-    const double* point;
-    Index first, last;
-    bool semivariance;
-    double* out;
-};
-
-/// out += sill * value of the model at squared distances. The elementary functions of a stable structure one
-/// after the other over all of them: their chains of dependent operations then overlap.
+/// out += factor * value of a stable structure at squared distances. The elementary functions one after the
+/// other over all of them: their chains of dependent operations then overlap.
 template <class V>
-[[gnu::always_inline]] inline void addStable(const ModelColumns::Structure& s, const double* squared, Index n,
-                                             bool semivariance, double* out) {
+[[gnu::always_inline]] inline void addStable(const ModelColumns::Structure& s, double factor,
+                                             const double* squared, Index n, bool semivariance, double* out) {
     alignas(64) double x[kChunk];
     const double half = s.halfShape;
     if (half == 1) {  // Gaussian: no power to take
@@ -113,37 +117,50 @@ template <class V>
     }
     for (Index i = 0; i < n; i += kLanes<V>) {
         const V value = load<V>(x + i);
-        store(out + i, load<V>(out + i) + s.sill * (semivariance ? decayComplement(value) : decay(value)));
+        store(out + i, load<V>(out + i) + factor * (semivariance ? decayComplement(value) : decay(value)));
     }
 }
 
+/// sum += squared differences from a point along axes [first, last).
+template <class V>
+[[gnu::always_inline]] inline V addSquares(const ModelColumns::Columns& c, Index i, Index point, Index first,
+                                           Index last, V sum) {
+    for (Index axis = first; axis < last; ++axis) {
+        const V d = load<V>(c.places + axis * c.leading + i) - c.points[axis * c.pointsLeading + point];
+        sum += d * d;
+    }
+    return sum;
+}
+
 template <int bytes>
-[[gnu::always_inline]] inline void columnsBody(const Columns& c) {
+[[gnu::always_inline]] inline void columnsBody(const ModelColumns::Columns& c) {
     using V = typename Vectors<double, bytes>::Type;
-    alignas(64) double squared[kChunk];
+    alignas(64) double common[kChunk], squared[kChunk];
+    const Index own = c.axes - c.commonAxes;
     for (Index begin = c.first / kLanes<V> * kLanes<V>; begin < c.last; begin += kChunk) {
         const Index n = std::min(kChunk, c.last - begin);
         double* out = c.out + begin;
         for (Index i = 0; i < n; i += kLanes<V>) {
-            V sum{};
-            for (Index axis = 0; axis < c.axes; ++axis) {
-                const V d = load<V>(c.places + axis * c.leading + begin + i) - c.point[axis];
-                sum += d * d;
-            }
-            store(squared + i, sum);
+            store(common + i, addSquares<V>(c, begin + i, 0, own, c.axes, V{}));
             store(out + i, V{});
         }
-        for (std::size_t k = 0; k < c.count; ++k) {
-            const ModelColumns::Structure& s = c.structures[k];
-            if (s.type == StructureType::Stable) {
-                addStable<V>(s, squared, n, c.semivariance, out);
-                continue;
-            }
+        for (Index point = 0; point < c.pointCount; ++point) {
             for (Index i = 0; i < n; i += kLanes<V>)
-                store(out + i,
-                      load<V>(out + i) +
-                          s.sill * structureValue<V>(s.type, load<V>(squared + i) * s.inverseSquaredRange,
-                                                     spread<V>(s.halfShape), s.halfShape, c.semivariance));
+                store(squared + i, addSquares<V>(c, begin + i, point, 0, own, load<V>(common + i)));
+            for (std::size_t k = 0; k < c.count; ++k) {
+                const ModelColumns::Structure& s = c.structures[k];
+                const double factor = c.weights ? c.weights[point] * s.sill : s.sill;
+                if (s.type == StructureType::Stable) {
+                    addStable<V>(s, factor, squared, n, c.semivariance, out);
+                    continue;
+                }
+                for (Index i = 0; i < n; i += kLanes<V>) {
+                    const V u2 = load<V>(squared + i) * s.inverseSquaredRange;
+                    store(out + i,
+                          load<V>(out + i) + factor * structureValue<V>(s.type, u2, spread<V>(s.halfShape),
+                                                                        s.halfShape, c.semivariance));
+                }
+            }
         }
     }
 }
@@ -169,9 +186,11 @@ double choleskyBase(double* a, Index n, Index rows, Index leading) {
 float choleskyBase(float* a, Index n, Index rows, Index leading) {
     return choleskyBody<float, 16>(a, n, rows, leading);
 }
-[[gnu::target("avx512f,avx512dq,avx512vl")]] void columnsAvx512(const Columns& c) { columnsBody<64>(c); }
-[[gnu::target("avx2")]] void columnsAvx2(const Columns& c) { columnsBody<32>(c); }
-void columnsBase(const Columns& c) { columnsBody<16>(c); }
+[[gnu::target("avx512f,avx512dq,avx512vl")]] void columnsAvx512(const ModelColumns::Columns& c) {
+    columnsBody<64>(c);
+}
+[[gnu::target("avx2")]] void columnsAvx2(const ModelColumns::Columns& c) { columnsBody<32>(c); }
+void columnsBase(const ModelColumns::Columns& c) { columnsBody<16>(c); }
 
 }  // namespace
 
@@ -218,40 +237,45 @@ ModelColumns::ModelColumns(const VariogramModel& model) : model_(model) {
 
 void ModelColumns::semivariances(const double* places, Index leading, Index axes, const double* point,
                                  Index first, Index last, double* out) const {
-    evaluate(places, leading, axes, point, first, last, true, out);
+    evaluate({nullptr, 0, places, leading, axes, point, 1, 1, 0, nullptr, first, last, true, out});
 }
 
 void ModelColumns::covariances(const double* places, Index leading, Index axes, const double* point,
                                Index first, Index last, double* out) const {
-    evaluate(places, leading, axes, point, first, last, false, out);
+    evaluate({nullptr, 0, places, leading, axes, point, 1, 1, 0, nullptr, first, last, false, out});
 }
 
-void ModelColumns::evaluate(const double* places, Index leading, Index axes, const double* point, Index first,
-                            Index last, bool semivariance, double* out) const {
-    if (vectorised_ && (closedSemivariance_ || !semivariance)) {
-        const Columns columns{structures_.data(),
-                              structures_.size(),
-                              places,
-                              leading,
-                              axes,
-                              point,
-                              first,
-                              last,
-                              semivariance,
-                              out};
+void ModelColumns::ofBlock(const double* places, Index leading, const Eigen::MatrixXd& points,
+                           const double* weights, Index last, bool semivariance, double* out) const {
+    Index common = 0;
+    while (common < points.cols() &&
+           (points.col(points.cols() - 1 - common).array() == points(0, points.cols() - 1 - common)).all())
+        ++common;
+    evaluate({nullptr, 0, places, leading, points.cols(), points.data(), points.rows(), points.rows(), common,
+              weights, 0, last, semivariance, out});
+}
+
+void ModelColumns::evaluate(Columns c) const {
+    if (vectorised_ && (closedSemivariance_ || !c.semivariance)) {
+        c.structures = structures_.data();
+        c.count = structures_.size();
         const InstructionSet set = instructionSet();
-        if (set == InstructionSet::Avx512) return columnsAvx512(columns);
-        if (set == InstructionSet::Avx2) return columnsAvx2(columns);
-        return columnsBase(columns);
+        if (set == InstructionSet::Avx512) return columnsAvx512(c);
+        if (set == InstructionSet::Avx2) return columnsAvx2(c);
+        return columnsBase(c);
     }
-    for (Index i = first; i < last; ++i) {
-        double squared = 0;
-        for (Index axis = 0; axis < axes; ++axis) {
-            const double d = places[axis * leading + i] - point[axis];
-            squared += d * d;
+    for (Index i = c.first; i < c.last; ++i) {
+        c.out[i] = 0;
+        for (Index point = 0; point < c.pointCount; ++point) {
+            double squared = 0;
+            for (Index axis = 0; axis < c.axes; ++axis) {
+                const double d = c.places[axis * c.leading + i] - c.points[axis * c.pointsLeading + point];
+                squared += d * d;
+            }
+            const double h = std::sqrt(squared);
+            c.out[i] += (c.weights ? c.weights[point] : 1) *
+                        (c.semivariance ? vlx::semivariance(model_, h) : vlx::covariance(model_, h));
         }
-        const double h = std::sqrt(squared);
-        out[i] = semivariance ? vlx::semivariance(model_, h) : vlx::covariance(model_, h);
     }
 }
 

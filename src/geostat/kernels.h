@@ -42,6 +42,13 @@ class ModelColumns {
     void covariances(const double* places, Eigen::Index leading, Eigen::Index axes, const double* point,
                      Eigen::Index first, Eigen::Index last, double* out) const;
 
+    /// The sum over the points of a block (one a row), times their weights, of the same values, to places
+    /// [0, last): what their last coordinates, equal in all of them, add to distances is found once. Entries
+    /// up to the next multiple of eight are also written.
+    void ofBlock(const double* places, Eigen::Index leading, const Eigen::MatrixXd& points,
+                 const double* weights, Eigen::Index last, bool semivariance, double* out) const;
+
+    struct Columns;
     struct Structure {
         StructureType type;
         double sill;
@@ -50,8 +57,7 @@ class ModelColumns {
     };
 
   private:
-    void evaluate(const double* places, Eigen::Index leading, Eigen::Index axes, const double* point,
-                  Eigen::Index first, Eigen::Index last, bool semivariance, double* out) const;
+    void evaluate(Columns columns) const;
 
     std::vector<Structure> structures_;
     VariogramModel model_;

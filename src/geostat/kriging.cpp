@@ -225,6 +225,18 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
     const VectorXd centre = place(origin_.transpose()).transpose();
     VectorXd column(places_.rows() + 8);  // whole vectors are written
     Footprint footprint;
+    // Data by their first coordinate.
+    std::vector<Index> order(static_cast<std::size_t>(n));
+    std::iota(order.begin(), order.end(), Index{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](Index i, Index j) { return positions_(0, i) < positions_(0, j); });
+    const auto alongFirstAxis = [&](double x) {
+        const auto first = std::lower_bound(order.begin(), order.end(), x,
+                                            [&](Index i, double value) { return positions_(0, i) < value; });
+        const auto last = std::upper_bound(first, order.end(), x,
+                                           [&](double value, Index i) { return value < positions_(0, i); });
+        return std::pair{first, last};
+    };
     for (Index t = 0; shapes && t < m; ++t) {
         const Block target = block(targets, t);
         if (!target.valid) continue;
@@ -246,20 +258,16 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
         const MatrixXd places = place(target.points);
         const double within = footprint.meanInside(places, target.weights, model_, generalised);
         double outward = 0;  // generalised: mean semivariance between centre and block
-        for (Index a = 0; a < places.rows(); ++a) {
-            const VectorXd point = places.row(a).transpose();
-            if (generalised) {
-                // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
-                const double g = semivariance(model_, (point - centre).norm());
-                outward += target.weights[a] * g;
-                columns_->semivariances(places_.data(), places_.rows(), places_.cols(), point.data(), 0, n,
-                                        column.data());
-                c0.array() += target.weights[a] * (g - column.head(n).array());
-            } else {
-                columns_->covariances(places_.data(), places_.rows(), places_.cols(), point.data(), 0, n,
-                                      column.data());
-                c0 += target.weights[a] * column.head(n);
-            }
+        columns_->ofBlock(places_.data(), places_.rows(), places, target.weights.data(), n, generalised,
+                          column.data());
+        if (generalised) {
+            // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
+            for (Index a = 0; a < places.rows(); ++a)
+                outward +=
+                    target.weights[a] * semivariance(model_, (places.row(a) - centre.transpose()).norm());
+            c0.array() += outward - column.head(n).array();
+        } else {
+            c0 = column.head(n);
         }
         lower.entryError[t] = kEntryRounding * (generalised ? 4 * level_ + 3 * outward : structureSill_);
         if (problem_.transform.size() > 0)
@@ -270,12 +278,14 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
             lower.variance[t] = (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +
                                 level_ * (2 * sum - sum * sum) + 2 * sum * outward - within;
         const Index axes = target.isPoint ? targets.points.cols() : targets.cellAxes;
+        if (nugget_ == 0 && !target.isPoint) continue;  // nothing to share
         for (Index a = 0; a < places.rows() && axes > 0; ++a) {
             const double weight = target.weights[a];
             lower.variance[t] += weight * weight * nugget_;
-            const VectorXd cell = target.points.row(a).head(axes).transpose();
-            for (Index i = 0; i < n; ++i) {
-                if (positions_.col(i).head(axes) != cell) continue;
+            const auto [begin, end] = alongFirstAxis(target.points(a, 0));
+            for (auto at = begin; at != end; ++at) {
+                const Index i = *at;
+                if (positions_.col(i).head(axes) != target.points.row(a).head(axes).transpose()) continue;
                 c0[i] += weight * nugget_;
                 if (target.isPoint && errors_[i] == 0 &&
                     (external_.row(i).array() == external.row(0).array()).all())
