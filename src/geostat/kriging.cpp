@@ -21,25 +21,28 @@ struct KrigingSystem::Block {
 
 namespace {
 
+/// Points, one a row, with rows of zeros up to whole vectors.
+MatrixXd padded(const MatrixXd& points) {
+    MatrixXd out = MatrixXd::Zero((points.rows() + 7) / 8 * 8, points.cols());
+    out.topRows(points.rows()) = points;
+    return out;
+}
+
 /// The mean covariance, or semivariance, between the points of a block. Blocks that are one footprint moved
 /// have the same: it is computed once.
 class Footprint {
   public:
-    double meanInside(const MatrixXd& places, const VectorXd& weights, const VariogramModel& model,
+    double meanInside(const MatrixXd& places, const VectorXd& weights, const kernels::ModelColumns& model,
                       bool semivariances) {
         MatrixXd offsets = places.rowwise() - places.row(0);
         if (offsets.rows() == offsets_.rows() && offsets == offsets_ && weights == weights_) return mean_;
         offsets_ = std::move(offsets);
         weights_ = weights;
-        mean_ = 0;
-        for (Index a = 0; a < places.rows(); ++a) {
-            for (Index b = 0; b < a; ++b) {
-                const double h = (offsets_.row(a) - offsets_.row(b)).norm();
-                mean_ += 2 * weights_[a] * weights_[b] *
-                         (semivariances ? semivariance(model, h) : covariance(model, h));
-            }
-            if (!semivariances) mean_ += weights_[a] * weights_[a] * model.sill();
-        }
+        const MatrixXd to = padded(offsets_);
+        VectorXd means(to.rows());
+        model.ofBlock(to.data(), to.rows(), offsets_, weights_.data(), offsets_.rows(), semivariances,
+                      means.data());
+        mean_ = weights_.dot(means.head(offsets_.rows()));
         return mean_;
     }
 
@@ -256,15 +259,17 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
             continue;
         }
         const MatrixXd places = place(target.points);
-        const double within = footprint.meanInside(places, target.weights, model_, generalised);
+        const double within = footprint.meanInside(places, target.weights, *columns_, generalised);
         double outward = 0;  // generalised: mean semivariance between centre and block
         columns_->ofBlock(places_.data(), places_.rows(), places, target.weights.data(), n, generalised,
                           column.data());
         if (generalised) {
             // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
-            for (Index a = 0; a < places.rows(); ++a)
-                outward +=
-                    target.weights[a] * semivariance(model_, (places.row(a) - centre.transpose()).norm());
+            const MatrixXd from = padded(places);
+            VectorXd toCentre(from.rows());
+            columns_->semivariances(from.data(), from.rows(), from.cols(), centre.data(), 0, places.rows(),
+                                    toCentre.data());
+            outward = target.weights.dot(toCentre.head(places.rows()));
             c0.array() += outward - column.head(n).array();
         } else {
             c0 = column.head(n);

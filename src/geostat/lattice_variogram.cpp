@@ -40,35 +40,47 @@ struct LatticeSums {
 
 double acrossLanes(const LatticeSums::Lanes& x) { return (x[0] + x[1]) + (x[2] + x[3]); }
 
-/// Adds the pairs of cells (u, v) and (u + right, v + down), right >= 0.
-VLX_WIDE void addOffset(const LatticePlanes& of, Index right, Index down, double distance,
-                        LatticeSums& sums) {
+/// Adds the pairs of cells (u, v) and (u + right, v + down), right >= 0. `count`: of the planes of values,
+/// where the compiler knows it.
+template <Index count>
+[[gnu::always_inline]] inline void addPairs(const LatticePlanes& of, Index right, Index down, double distance,
+                                            LatticeSums& sums) {
     const Index first = down < 0 ? -down : 0, last = down < 0 ? of.height : of.height - down;
     const Index plane = of.size(), apart = down * of.stride + right;
+    const Index channels = count > 0 ? count : of.channels;
     FourDoubles pairs{}, squares{}, noise{};
-    for (Index v = first; v < last; ++v)
-        for (Index u = 0; u < of.width - right; u += kWide) {
-            const double* cell = of.numbers.data() + v * of.stride + u;
+    for (Index v = first; v < last; ++v) {
+        const double* row = of.numbers.data() + v * of.stride;
+        for (const double *cell = row, *end = row + of.width - right; cell < end; cell += kWide) {
             const FourDoubles both = simd::load<FourDoubles>(cell) * simd::load<FourDoubles>(cell + apart);
-            cell += plane;
-            const FourDoubles errors = simd::load<FourDoubles>(cell) + simd::load<FourDoubles>(cell + apart);
+            const FourDoubles errors =
+                simd::load<FourDoubles>(cell + plane) + simd::load<FourDoubles>(cell + plane + apart);
             FourDoubles squared{};
-            for (Index c = 0; c < of.channels; ++c) {
-                cell += plane;
+            for (Index c = 0; c < channels; ++c) {
+                const double* value = cell + (2 + c) * plane;
                 const FourDoubles difference =
-                    simd::load<FourDoubles>(cell) - simd::load<FourDoubles>(cell + apart);
+                    simd::load<FourDoubles>(value) - simd::load<FourDoubles>(value + apart);
                 squared += difference * difference;
             }
             pairs += both;
             squares += both * squared;
             noise += both * errors;
         }
+    }
     for (std::size_t lane = 0; lane < sums.pairs.size(); ++lane) {
         sums.pairs[lane] += pairs[lane];
         sums.distance[lane] += distance * pairs[lane];
         sums.squares[lane] += squares[lane];
         sums.noise[lane] += noise[lane];
     }
+}
+
+VLX_WIDE void addOffset(const LatticePlanes& of, Index right, Index down, double distance,
+                        LatticeSums& sums) {
+    if (of.channels == 3)
+        addPairs<3>(of, right, down, distance, sums);
+    else
+        addPairs<0>(of, right, down, distance, sums);
 }
 
 }  // namespace
