@@ -26,49 +26,59 @@ struct ModelColumns::Columns {
 
 namespace {
 
-/// Left-looking by blocks of four columns; two vectors of rows at a time, so that eight sums stay in
-/// registers.
+constexpr Index kWidth = 4;  // columns of a matrix at a time
+
+/// a[i, j + c] -= sum over k of left[i, k] * right[k, c], c < w <= kWidth, for two vectors of rows i, so that
+/// eight sums stay in registers. `...Step`: from k to k + 1, `across`: from c to c + 1.
+template <class V, class T>
+[[gnu::always_inline]] inline void subtractProducts(T* a, Index leading, Index w, const T* left,
+                                                    Index leftStep, const T* right, Index rightStep,
+                                                    Index across, Index count) {
+    constexpr Index lanes = kLanes<V>;
+    T* column[kWidth];
+    const T* of[kWidth];
+    for (Index c = 0; c < kWidth; ++c) {  // missing columns repeat the first one
+        column[c] = a + (c < w ? c : 0) * leading;
+        of[c] = right + (c < w ? c : 0) * across;
+    }
+    V s00 = load<V>(column[0]), s01 = load<V>(column[0] + lanes);
+    V s10 = load<V>(column[1]), s11 = load<V>(column[1] + lanes);
+    V s20 = load<V>(column[2]), s21 = load<V>(column[2] + lanes);
+    V s30 = load<V>(column[3]), s31 = load<V>(column[3] + lanes);
+    for (Index k = 0; k < count; ++k) {
+        const V l0 = load<V>(left + k * leftStep), l1 = load<V>(left + lanes + k * leftStep);
+        const T r0 = of[0][k * rightStep], r1 = of[1][k * rightStep];
+        const T r2 = of[2][k * rightStep], r3 = of[3][k * rightStep];
+        s00 -= l0 * r0;
+        s01 -= l1 * r0;
+        s10 -= l0 * r1;
+        s11 -= l1 * r1;
+        s20 -= l0 * r2;
+        s21 -= l1 * r2;
+        s30 -= l0 * r3;
+        s31 -= l1 * r3;
+    }
+    store(column[0], s00);
+    store(column[0] + lanes, s01);
+    if (w > 1) store(column[1], s10), store(column[1] + lanes, s11);
+    if (w > 2) store(column[2], s20), store(column[2] + lanes, s21);
+    if (w > 3) store(column[3], s30), store(column[3] + lanes, s31);
+}
+
+/// Left-looking by blocks of four columns.
 template <class T, int bytes>
 [[gnu::always_inline]] inline T choleskyBody(T* a, Index n, Index rows, Index leading) {
     using V = typename Vectors<T, bytes>::Type;
     constexpr Index lanes = kLanes<V>;
-    constexpr Index width = 4;
     T lowest = n > 0 ? a[0] : T(1);
-    for (Index j = 0; j < n; j += width) {
-        const Index w = std::min(width, n - j);
-        // Sums over the columns already factorised. Missing columns of the last block repeat the first one.
-        const T* rowOf[width];
-        T* column[width];
-        for (Index c = 0; c < width; ++c) {
-            rowOf[c] = a + j + (c < w ? c : 0);
-            column[c] = a + (j + (c < w ? c : 0)) * leading;
-        }
-        for (Index i = j / (2 * lanes) * (2 * lanes); i < rows; i += 2 * lanes) {
-            V s00 = load<V>(column[0] + i), s01 = load<V>(column[0] + i + lanes);
-            V s10 = load<V>(column[1] + i), s11 = load<V>(column[1] + i + lanes);
-            V s20 = load<V>(column[2] + i), s21 = load<V>(column[2] + i + lanes);
-            V s30 = load<V>(column[3] + i), s31 = load<V>(column[3] + i + lanes);
-            for (Index k = 0; k < j; ++k) {
-                const V l0 = load<V>(a + i + k * leading), l1 = load<V>(a + i + lanes + k * leading);
-                const T r0 = rowOf[0][k * leading], r1 = rowOf[1][k * leading];
-                const T r2 = rowOf[2][k * leading], r3 = rowOf[3][k * leading];
-                s00 -= l0 * r0;
-                s01 -= l1 * r0;
-                s10 -= l0 * r1;
-                s11 -= l1 * r1;
-                s20 -= l0 * r2;
-                s21 -= l1 * r2;
-                s30 -= l0 * r3;
-                s31 -= l1 * r3;
-            }
-            store(column[0] + i, s00);
-            store(column[0] + i + lanes, s01);
-            if (w > 1) store(column[1] + i, s10), store(column[1] + i + lanes, s11);
-            if (w > 2) store(column[2] + i, s20), store(column[2] + i + lanes, s21);
-            if (w > 3) store(column[3] + i, s30), store(column[3] + i + lanes, s31);
-        }
+    for (Index j = 0; j < n; j += kWidth) {
+        const Index w = std::min(kWidth, n - j);
+        T* column = a + j * leading;
+        // Sums over the columns already factorised.
+        for (Index i = j / (2 * lanes) * (2 * lanes); i < rows; i += 2 * lanes)
+            subtractProducts<V>(column + i, leading, w, a + i, leading, a + j, leading, 1, j);
         // The diagonal block by hand.
-        T block[width][width], inverse[width];
+        T block[kWidth][kWidth], inverse[kWidth];
         for (Index c = 0; c < w; ++c)
             for (Index b = 0; b <= c; ++b) {
                 T s = a[j + c + (j + b) * leading];
@@ -84,18 +94,57 @@ template <class T, int bytes>
             }
         // The rows below it.
         for (Index i = j / lanes * lanes; i < rows; i += lanes) {
-            V x[width];
+            V x[kWidth];
             for (Index c = 0; c < w; ++c) {
-                V s = load<V>(column[c] + i);
+                V s = load<V>(column + c * leading + i);
                 for (Index b = 0; b < c; ++b) s -= x[b] * block[c][b];
                 x[c] = s * inverse[c];
-                store(column[c] + i, x[c]);
+                store(column + c * leading + i, x[c]);
             }
         }
         for (Index c = 0; c < w; ++c)
             for (Index b = 0; b <= c; ++b) a[j + c + (j + b) * leading] = block[c][b];
     }
     return lowest;
+}
+
+/// Rows of x, one vector of them: the block of w columns from j, when all before (behind) it is taken off.
+template <class V>
+[[gnu::always_inline]] inline void solveBlock(const double* l, Index leading, Index j, Index w, bool upper,
+                                              double* x, Index step) {
+    V solved[kWidth];
+    for (Index at = 0; at < w; ++at) {
+        const Index c = upper ? w - 1 - at : at;
+        V s = load<V>(x + c * step);
+        for (Index before = 0; before < at; ++before) {
+            const Index b = upper ? w - 1 - before : before;
+            s -= solved[b] * (upper ? l[j + b + (j + c) * leading] : l[j + c + (j + b) * leading]);
+        }
+        solved[c] = s * (1 / l[j + c + (j + c) * leading]);
+        store(x + c * step, solved[c]);
+    }
+}
+
+template <int bytes>
+[[gnu::always_inline]] inline void triangularBody(const double* l, Index n, Index leading, bool upper,
+                                                  double* x, Index m, Index step) {
+    using V = typename Vectors<double, bytes>::Type;
+    constexpr Index lanes = kLanes<V>;
+    const Index blocks = (n + kWidth - 1) / kWidth;
+    for (Index block = 0; block < blocks; ++block) {
+        const Index j = (upper ? blocks - 1 - block : block) * kWidth, w = std::min(kWidth, n - j);
+        const Index next = j + w;
+        for (Index i = 0; i < m; i += 2 * lanes) {
+            double* at = x + i + j * step;
+            if (upper)
+                subtractProducts<V>(at, step, w, x + i + next * step, step, l + next + j * leading, 1,
+                                    leading, n - next);
+            else
+                subtractProducts<V>(at, step, w, x + i, step, l + j, leading, 1, j);
+            solveBlock<V>(l, leading, j, w, upper, at, step);
+            solveBlock<V>(l, leading, j, w, upper, at + lanes, step);
+        }
+    }
 }
 
 constexpr Index kChunk = 128;  // values at a time
@@ -186,6 +235,18 @@ double choleskyBase(double* a, Index n, Index rows, Index leading) {
 float choleskyBase(float* a, Index n, Index rows, Index leading) {
     return choleskyBody<float, 16>(a, n, rows, leading);
 }
+[[gnu::target("avx512f,avx512dq,avx512vl")]] void triangularAvx512(const double* l, Index n, Index leading,
+                                                                   bool upper, double* x, Index m,
+                                                                   Index step) {
+    triangularBody<64>(l, n, leading, upper, x, m, step);
+}
+[[gnu::target("avx2")]] void triangularAvx2(const double* l, Index n, Index leading, bool upper, double* x,
+                                            Index m, Index step) {
+    triangularBody<32>(l, n, leading, upper, x, m, step);
+}
+void triangularBase(const double* l, Index n, Index leading, bool upper, double* x, Index m, Index step) {
+    triangularBody<16>(l, n, leading, upper, x, m, step);
+}
 [[gnu::target("avx512f,avx512dq,avx512vl")]] void columnsAvx512(const ModelColumns::Columns& c) {
     columnsBody<64>(c);
 }
@@ -219,6 +280,13 @@ float cholesky(float* a, Index n, Index rows, Index leading, InstructionSet set)
     if (set == InstructionSet::Avx512) return choleskyAvx512(a, n, rows, leading);
     if (set == InstructionSet::Avx2) return choleskyAvx2(a, n, rows, leading);
     return choleskyBase(a, n, rows, leading);
+}
+
+void solveTriangle(const double* l, Index n, Index leading, bool upper, double* x, Index m, Index step,
+                   InstructionSet set) {
+    if (set == InstructionSet::Avx512) return triangularAvx512(l, n, leading, upper, x, m, step);
+    if (set == InstructionSet::Avx2) return triangularAvx2(l, n, leading, upper, x, m, step);
+    triangularBase(l, n, leading, upper, x, m, step);
 }
 
 ModelColumns::ModelColumns(const VariogramModel& model) : model_(model) {

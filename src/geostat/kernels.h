@@ -28,6 +28,12 @@ double cholesky(double* a, Eigen::Index n, Eigen::Index rows, Eigen::Index leadi
 float cholesky(float* a, Eigen::Index n, Eigen::Index rows, Eigen::Index leading,
                InstructionSet set = instructionSet());
 
+/// Solves L y = b, or L' y = b if `upper`, for m right-hand sides, in place: each is a row of x, which is
+/// column-major with `step`, a multiple of 16 and at least m, from column to column. L is the factor of
+/// cholesky(); all rows of x must be finite.
+void solveTriangle(const double* l, Eigen::Index n, Eigen::Index leading, bool upper, double* x,
+                   Eigen::Index m, Eigen::Index step, InstructionSet set = instructionSet());
+
 /// A variogram model without its nugget, prepared for whole columns of values.
 class ModelColumns {
   public:

@@ -116,7 +116,7 @@ bool sameModel(const VariogramModel& a, const VariogramModel& b, const Classes& 
 std::optional<std::string> FitOptions::validate() const {
     if (structures.empty() || structures.size() > kMaxStructures)
         return "structures must be 1 to 3, found " + std::to_string(structures.size());
-    if (!(level >= 0 && level < 1)) return "level must be in [0, 1), found " + std::to_string(level);
+    if (!(level > 0 && level < 1)) return "level must be in (0, 1), found " + std::to_string(level);
     for (const FitStructure& s : structures) {
         if (!(s.minRange >= 0) || !(s.maxRange >= 0) || !std::isfinite(s.minRange) ||
             !std::isfinite(s.maxRange))
@@ -223,7 +223,7 @@ VariogramFit fitVariogram(const EmpiricalVariogram& variogram, const FitOptions&
     }
     if (options.search == FitSearch::Global)
         fit.standardErrors = parameterErrors(fit, options, classes, space, best);
-    if (options.level > 0) fit.sillTest = sillTest(variogram, options.level);
+    if (options.sillTest) fit.sillTest = sillTest(variogram, options.level);
     return fit;
 }
 

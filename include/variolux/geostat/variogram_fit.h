@@ -58,7 +58,8 @@ struct FitOptions {
     FitWeights weights = FitWeights::Pairs;
     VariogramModel reference;  ///< only for PairsPerSquaredReference
     FitSearch search = FitSearch::Global;
-    double level = 0.05;  ///< of the sill test, in (0, 1); 0: none
+    bool sillTest = true;  ///< also test whether there is structure
+    double level = 0.05;   ///< of that test, in (0, 1)
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
@@ -107,7 +108,7 @@ struct VariogramFit {
     /// confidence interval. Empty with FitSearch::Fast.
     Eigen::VectorXd standardErrors;
 
-    SillTest sillTest;  ///< as if nothing were known where it was not asked for
+    SillTest sillTest;  ///< p-value 1 without FitOptions::sillTest
 
     bool ok() const { return status == FitStatus::Ok || status == FitStatus::WeightsUnconverged; }
     std::string message() const;

@@ -155,7 +155,7 @@ VariogramFit fitStableModel(const EmpiricalVariogram& variogram, bool nugget) {
     options.nugget = nugget;
     options.weights = FitWeights::PairsPerSquaredDistance;
     options.search = FitSearch::Fast;
-    options.level = 0;  // whether there is structure, the sill tells
+    options.sillTest = false;  // whether there is structure, the sill tells
     return fitVariogram(variogram, options);
 }
 
