@@ -228,8 +228,9 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
     const VectorXd centre = place(origin_.transpose()).transpose();
     VectorXd column(places_.rows() + 8);  // whole vectors are written
     Footprint footprint;
-    // Data by their first coordinate.
-    std::vector<Index> order(static_cast<std::size_t>(n));
+    // Data by their first coordinate, where any may be at a target.
+    const bool sharing = nugget_ > 0 || targets.begin.empty();
+    std::vector<Index> order(static_cast<std::size_t>(sharing ? n : 0));
     std::iota(order.begin(), order.end(), Index{0});
     std::stable_sort(order.begin(), order.end(),
                      [&](Index i, Index j) { return positions_(0, i) < positions_(0, j); });
@@ -283,7 +284,7 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
             lower.variance[t] = (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +
                                 level_ * (2 * sum - sum * sum) + 2 * sum * outward - within;
         const Index axes = target.isPoint ? targets.points.cols() : targets.cellAxes;
-        if (nugget_ == 0 && !target.isPoint) continue;  // nothing to share
+        if (!sharing) continue;
         for (Index a = 0; a < places.rows() && axes > 0; ++a) {
             const double weight = target.weights[a];
             lower.variance[t] += weight * weight * nugget_;

@@ -46,7 +46,7 @@ enum class FitSearch {
     /// The global minimum, SSE to 1e-9 of itself with one structure; about 0.1 ms, 1 ms with a free shape.
     Global,
     /// For tens of thousands of regions: a grid of 28 ranges (by 8 shapes) and one refinement, for 12 classes
-    /// about 15 microseconds (60 with a free shape), sill test included. SSE within 1 % of the global minimum
+    /// about 10 microseconds (35 with a free shape), sill test included. SSE within 1 % of the global minimum
     /// for 98 % of noisy variograms (the tests assert it). Several structures are searched as by Global.
     /// Iterated weights are updated three times; no parameter standard errors.
     Fast,

@@ -19,7 +19,7 @@ namespace {
 constexpr int kColours = 3;  // R, G, B carry the variogram
 constexpr int kMinData = 3;  // a variogram needs two distances
 constexpr int kDistanceClasses = 12;
-constexpr int kMostCells = 5;          // a datum: a variogram by the lattice's cells is then quicker
+constexpr int kMostCells = 5;          // for each datum: up to here the lattice's variogram is quicker
 constexpr double kMinExponent = 0.25;  // lower ones are a nugget in all but name
 
 /// A pixel's samples are as many as an adaptive sampler saw fit: they must not outweigh its neighbours'.
