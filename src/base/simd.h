@@ -144,15 +144,24 @@ template <class V>
     return k + (s * 2.8853900817779268 + s * s2 * p);
 }
 
-/// x^a for x >= 0 and 0 < a <= 1, to about (1 + |a log x|) ulp; 0^a = 0. x counts as at most 2^1000, and as
-/// at least 2^-1023 if positive.
+/// The two halves of power(): log2(x^a), and 2^y = x^a given x.
 template <class V>
-[[gnu::always_inline]] inline V power(V x, V a) {
-    const V y = a * binaryLogarithm(minimum(x, spread<V>(0x1p1000)));
+[[gnu::always_inline]] inline V powerLogarithm(V x, V a) {
+    return a * binaryLogarithm(minimum(x, spread<V>(0x1p1000)));
+}
+template <class V>
+[[gnu::always_inline]] inline V powerOfTwo(V x, V y) {
     const V shifted = y + kRounding;
     const V k = shifted - kRounding;
     const Exponential<V> e = scaledExponential(shifted, (y - k) * 0x1.62e42fefa39efp-1);
     return x > 0.0 ? e.scale + e.scale * e.rest : V{};
+}
+
+/// x^a for x >= 0 and 0 < a <= 1, to about (1 + |a log x|) ulp; 0^a = 0. x counts as at most 2^1000, and as
+/// at least 2^-1023 if positive.
+template <class V>
+[[gnu::always_inline]] inline V power(V x, V a) {
+    return powerOfTwo(x, powerLogarithm(x, a));
 }
 
 /// exp(-d) within 0.02 for d >= 0, exactly 0 from 8 on: (1 - d/8)^8. A weight needs no more, and this is four

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geostat/kernels.h"
 #include "geostat/kriging_names.h"
 #include "variolux/geostat/covariance_system.h"
 
@@ -10,6 +11,7 @@ namespace vlx {
 namespace {
 
 constexpr int kMostSingleSteps = 8;
+constexpr Index kRows = 8;  // right-hand sides from which solveRows() is quicker
 
 /// A few right-hand sides are quicker one at a time.
 template <class Triangle, class Matrix>
@@ -21,11 +23,21 @@ void solveTriangle(const Triangle& triangle, Matrix& x) {
     }
 }
 
+/// Many are rows of vectors.
+void solveRows(const MatrixXd& factor, bool upper, MatrixXd& x) {
+    const Index n = x.rows(), m = x.cols();
+    MatrixXd rows = MatrixXd::Zero((m + 15) / 16 * 16, n);
+    rows.topRows(m) = x.transpose();
+    kernels::solveTriangle(factor.data(), n, factor.rows(), upper, rows.data(), m, rows.rows());
+    x = rows.topRows(m).transpose();
+}
+
 }  // namespace
 
 void CovarianceSystem::solveLower(MatrixXd& x) const {
     const Index n = covariance_.rows();
     if (n == 0 || x.cols() == 0) return;
+    if (!report_.singlePrecision && x.cols() >= kRows) return solveRows(factor_, false, x);
     if (!report_.singlePrecision) return solveTriangle(factor_.topRows(n).triangularView<Eigen::Lower>(), x);
     Eigen::MatrixXf y = x.cast<float>();
     solveTriangle(factorSingle_.topRows(n).triangularView<Eigen::Lower>(), y);
@@ -35,6 +47,7 @@ void CovarianceSystem::solveLower(MatrixXd& x) const {
 void CovarianceSystem::solveUpper(MatrixXd& x) const {
     const Index n = covariance_.rows();
     if (n == 0 || x.cols() == 0) return;
+    if (!report_.singlePrecision && x.cols() >= kRows) return solveRows(factor_, true, x);
     if (!report_.singlePrecision)
         return solveTriangle(factor_.topRows(n).triangularView<Eigen::Lower>().transpose(), x);
     Eigen::MatrixXf y = x.cast<float>();

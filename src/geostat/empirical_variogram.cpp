@@ -6,6 +6,8 @@
 #include <limits>
 #include <sstream>
 
+#include "geostat/lag_classes.h"
+
 namespace vlx {
 namespace {
 
@@ -58,40 +60,6 @@ void scale(CleanData& data) {
     data.values = data.values.unaryExpr(shift(-data.exponent)).eval();
     if (data.noise.size() > 0) data.noise = data.noise.unaryExpr(shift(-2 * data.exponent)).eval();
 }
-
-/// Finds the class of a distance: -1 for none.
-class LagClasses {
-  public:
-    explicit LagClasses(const std::vector<double>& edges) : edges_(edges) {
-        const double width = (edges.back() - edges.front()) / static_cast<double>(count());
-        uniform_ = true;
-        for (std::size_t b = 0; b < edges.size(); ++b)
-            uniform_ = uniform_ &&
-                       std::abs(edges[b] - edges.front() - width * static_cast<double>(b)) < 0.01 * width;
-        inverseWidth_ = 1 / width;
-    }
-
-    int count() const { return static_cast<int>(edges_.size()) - 1; }
-
-    int find(double distance) const {
-        if (distance <= edges_.front()) return distance == 0 && edges_.front() == 0 ? 0 : -1;
-        if (!(distance <= edges_.back())) return -1;
-        if (!uniform_)
-            return static_cast<int>(std::lower_bound(edges_.begin(), edges_.end(), distance) -
-                                    edges_.begin()) -
-                   1;
-        // The quotient may round across an edge; the edges themselves decide.
-        int b = std::min(static_cast<int>((distance - edges_.front()) * inverseWidth_), count() - 1);
-        while (distance <= edges_[static_cast<std::size_t>(b)]) --b;
-        while (distance > edges_[static_cast<std::size_t>(b) + 1]) ++b;
-        return b;
-    }
-
-  private:
-    const std::vector<double>& edges_;
-    bool uniform_ = true;
-    double inverseWidth_ = 1;
-};
 
 /// Distances and squared norms of the value differences from datum i to all later data, vectorised.
 struct PairRow {
@@ -299,11 +267,7 @@ EmpiricalVariogram empiricalVariogram(const Eigen::Ref<const Eigen::MatrixXd>& p
     result.skipped = data.skipped;
     result.nullError = Eigen::VectorXd::Zero(k);
     result.nullCorrelation = Eigen::MatrixXd::Zero(k, k);
-    for (std::size_t b = 0; b + 1 < options.edges.size(); ++b) {
-        const double lower = options.edges[b], upper = options.edges[b + 1];
-        const double nan = std::numeric_limits<double>::quiet_NaN();
-        result.bins.push_back({lower, upper, 0, 0.5 * (lower + upper), nan, 0, nan});
-    }
+    result.bins = emptyBins(options.edges);
     if (n < 2) {
         result.status = VariogramStatus::TooFewData;
         return result;

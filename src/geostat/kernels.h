@@ -28,6 +28,12 @@ double cholesky(double* a, Eigen::Index n, Eigen::Index rows, Eigen::Index leadi
 float cholesky(float* a, Eigen::Index n, Eigen::Index rows, Eigen::Index leading,
                InstructionSet set = instructionSet());
 
+/// Solves L y = b, or L' y = b if `upper`, for m right-hand sides, in place: each is a row of x, which is
+/// column-major with `step`, a multiple of 16 and at least m, from column to column. L is the factor of
+/// cholesky(); all rows of x must be finite.
+void solveTriangle(const double* l, Eigen::Index n, Eigen::Index leading, bool upper, double* x,
+                   Eigen::Index m, Eigen::Index step, InstructionSet set = instructionSet());
+
 /// A variogram model without its nugget, prepared for whole columns of values.
 class ModelColumns {
   public:
@@ -42,6 +48,13 @@ class ModelColumns {
     void covariances(const double* places, Eigen::Index leading, Eigen::Index axes, const double* point,
                      Eigen::Index first, Eigen::Index last, double* out) const;
 
+    /// The sum over the points of a block (one a row), times their weights, of the same values, to places
+    /// [0, last): what their last coordinates, equal in all of them, add to distances is found once. Entries
+    /// up to the next multiple of eight are also written.
+    void ofBlock(const double* places, Eigen::Index leading, const Eigen::MatrixXd& points,
+                 const double* weights, Eigen::Index last, bool semivariance, double* out) const;
+
+    struct Columns;
     struct Structure {
         StructureType type;
         double sill;
@@ -50,8 +63,7 @@ class ModelColumns {
     };
 
   private:
-    void evaluate(const double* places, Eigen::Index leading, Eigen::Index axes, const double* point,
-                  Eigen::Index first, Eigen::Index last, bool semivariance, double* out) const;
+    void evaluate(Columns columns) const;
 
     std::vector<Structure> structures_;
     VariogramModel model_;

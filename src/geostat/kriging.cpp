@@ -21,25 +21,28 @@ struct KrigingSystem::Block {
 
 namespace {
 
+/// Points, one a row, with rows of zeros up to whole vectors.
+MatrixXd padded(const MatrixXd& points) {
+    MatrixXd out = MatrixXd::Zero((points.rows() + 7) / 8 * 8, points.cols());
+    out.topRows(points.rows()) = points;
+    return out;
+}
+
 /// The mean covariance, or semivariance, between the points of a block. Blocks that are one footprint moved
 /// have the same: it is computed once.
 class Footprint {
   public:
-    double meanInside(const MatrixXd& places, const VectorXd& weights, const VariogramModel& model,
+    double meanInside(const MatrixXd& places, const VectorXd& weights, const kernels::ModelColumns& model,
                       bool semivariances) {
         MatrixXd offsets = places.rowwise() - places.row(0);
         if (offsets.rows() == offsets_.rows() && offsets == offsets_ && weights == weights_) return mean_;
         offsets_ = std::move(offsets);
         weights_ = weights;
-        mean_ = 0;
-        for (Index a = 0; a < places.rows(); ++a) {
-            for (Index b = 0; b < a; ++b) {
-                const double h = (offsets_.row(a) - offsets_.row(b)).norm();
-                mean_ += 2 * weights_[a] * weights_[b] *
-                         (semivariances ? semivariance(model, h) : covariance(model, h));
-            }
-            if (!semivariances) mean_ += weights_[a] * weights_[a] * model.sill();
-        }
+        const MatrixXd to = padded(offsets_);
+        VectorXd means(to.rows());
+        model.ofBlock(to.data(), to.rows(), offsets_, weights_.data(), offsets_.rows(), semivariances,
+                      means.data());
+        mean_ = weights_.dot(means.head(offsets_.rows()));
         return mean_;
     }
 
@@ -225,6 +228,19 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
     const VectorXd centre = place(origin_.transpose()).transpose();
     VectorXd column(places_.rows() + 8);  // whole vectors are written
     Footprint footprint;
+    // Data by their first coordinate, where any may be at a target.
+    const bool sharing = nugget_ > 0 || targets.begin.empty();
+    std::vector<Index> order(static_cast<std::size_t>(sharing ? n : 0));
+    std::iota(order.begin(), order.end(), Index{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](Index i, Index j) { return positions_(0, i) < positions_(0, j); });
+    const auto alongFirstAxis = [&](double x) {
+        const auto first = std::lower_bound(order.begin(), order.end(), x,
+                                            [&](Index i, double value) { return positions_(0, i) < value; });
+        const auto last = std::upper_bound(first, order.end(), x,
+                                           [&](double value, Index i) { return value < positions_(0, i); });
+        return std::pair{first, last};
+    };
     for (Index t = 0; shapes && t < m; ++t) {
         const Block target = block(targets, t);
         if (!target.valid) continue;
@@ -244,22 +260,20 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
             continue;
         }
         const MatrixXd places = place(target.points);
-        const double within = footprint.meanInside(places, target.weights, model_, generalised);
+        const double within = footprint.meanInside(places, target.weights, *columns_, generalised);
         double outward = 0;  // generalised: mean semivariance between centre and block
-        for (Index a = 0; a < places.rows(); ++a) {
-            const VectorXd point = places.row(a).transpose();
-            if (generalised) {
-                // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
-                const double g = semivariance(model_, (point - centre).norm());
-                outward += target.weights[a] * g;
-                columns_->semivariances(places_.data(), places_.rows(), places_.cols(), point.data(), 0, n,
-                                        column.data());
-                c0.array() += target.weights[a] * (g - column.head(n).array());
-            } else {
-                columns_->covariances(places_.data(), places_.rows(), places_.cols(), point.data(), 0, n,
-                                      column.data());
-                c0 += target.weights[a] * column.head(n);
-            }
+        columns_->ofBlock(places_.data(), places_.rows(), places, target.weights.data(), n, generalised,
+                          column.data());
+        if (generalised) {
+            // The increment's form gamma(x - centre) - gamma(x - x_i) stays small for far targets.
+            const MatrixXd from = padded(places);
+            VectorXd toCentre(from.rows());
+            columns_->semivariances(from.data(), from.rows(), from.cols(), centre.data(), 0, places.rows(),
+                                    toCentre.data());
+            outward = target.weights.dot(toCentre.head(places.rows()));
+            c0.array() += outward - column.head(n).array();
+        } else {
+            c0 = column.head(n);
         }
         lower.entryError[t] = kEntryRounding * (generalised ? 4 * level_ + 3 * outward : structureSill_);
         if (problem_.transform.size() > 0)
@@ -270,12 +284,14 @@ CovarianceTargets KrigingSystem::lowerTargets(const KrigingTargets& targets, Kri
             lower.variance[t] = (model_.bounded() ? structureSill_ * (1 - sum) * (1 - sum) : 0) +
                                 level_ * (2 * sum - sum * sum) + 2 * sum * outward - within;
         const Index axes = target.isPoint ? targets.points.cols() : targets.cellAxes;
+        if (!sharing) continue;
         for (Index a = 0; a < places.rows() && axes > 0; ++a) {
             const double weight = target.weights[a];
             lower.variance[t] += weight * weight * nugget_;
-            const VectorXd cell = target.points.row(a).head(axes).transpose();
-            for (Index i = 0; i < n; ++i) {
-                if (positions_.col(i).head(axes) != cell) continue;
+            const auto [begin, end] = alongFirstAxis(target.points(a, 0));
+            for (auto at = begin; at != end; ++at) {
+                const Index i = *at;
+                if (positions_.col(i).head(axes) != target.points.row(a).head(axes).transpose()) continue;
                 c0[i] += weight * nugget_;
                 if (target.isPoint && errors_[i] == 0 &&
                     (external_.row(i).array() == external.row(0).array()).all())

@@ -1,6 +1,5 @@
 #include "geostat/separable_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -8,102 +7,6 @@
 #include "geostat/simplex.h"
 
 namespace vlx::separable {
-
-double Problem::sse(double nugget, const std::array<double, kMaxStructures>& sills) const {
-    const std::size_t k = classes_.size();
-    double sum = 0;
-    for (std::size_t b = 0; b < k; ++b) {
-        double r = classes_.g[b] - nugget;
-        for (std::size_t s = 0; s < options_.structures.size(); ++s) r -= sills[s] * columns_[s * k + b];
-        sum += classes_.w[b] * r * r;
-    }
-    return sum;
-}
-
-/// One structure: the unconstrained minimum if it is feasible, else the better edge of the quadrant.
-Solution Problem::solveOne() const {
-    double sw = 0, sg = 0, sc = 0, scc = 0, scg = 0;
-    for (std::size_t b = 0; b < classes_.size(); ++b) {
-        const double w = classes_.w[b], c = columns_[b], g = classes_.g[b];
-        sw += w;
-        sg += w * g;
-        sc += w * c;
-        scc += w * c * c;
-        scg += w * c * g;
-    }
-    Solution best;
-    const double meanColumn = sc / sw, meanValue = sg / sw;
-    if (options_.nugget) {
-        double spread = 0, slope = 0;
-        for (std::size_t b = 0; b < classes_.size(); ++b) {
-            const double d = columns_[b] - meanColumn;
-            spread += classes_.w[b] * d * d;
-            slope += classes_.w[b] * d * (classes_.g[b] - meanValue);
-        }
-        if (spread > 1e-20 * scc) {
-            best.sills[0] = slope / spread;
-            best.nugget = meanValue - best.sills[0] * meanColumn;
-            if (best.sills[0] >= 0 && best.nugget >= 0) {
-                best.sse = sse(best.nugget, best.sills);
-                return best;
-            }
-        }
-        best = {};
-        best.nugget = std::max(0.0, meanValue);
-        best.sse = sse(best.nugget, best.sills);
-    } else {
-        best.sse = sse(0, best.sills);
-    }
-    Solution edge;
-    edge.sills[0] = scc > 0 ? std::max(0.0, scg / scc) : 0;
-    edge.sse = sse(0, edge.sills);
-    return edge.sse < best.sse ? edge : best;
-}
-
-/// Several structures: non-negative least squares by trying every set of non-zero coefficients.
-Solution Problem::solveSubsets() const {
-    const int m = static_cast<int>(options_.structures.size());
-    const int unknowns = m + (options_.nugget ? 1 : 0);
-    const std::size_t k = classes_.size();
-    const auto column = [&](int u, std::size_t b) {
-        return u < m ? columns_[static_cast<std::size_t>(u) * k + b] : 1.0;
-    };
-    Eigen::Matrix<double, 4, 4> gram = Eigen::Matrix<double, 4, 4>::Zero();
-    Eigen::Vector4d right = Eigen::Vector4d::Zero();
-    for (std::size_t b = 0; b < k; ++b)
-        for (int i = 0; i < unknowns; ++i) {
-            right[i] += classes_.w[b] * column(i, b) * classes_.g[b];
-            for (int j = 0; j < unknowns; ++j) gram(i, j) += classes_.w[b] * column(i, b) * column(j, b);
-        }
-    Solution best;
-    best.sse = sse(0, best.sills);
-    for (int set = 1; set < 1 << unknowns; ++set) {
-        std::array<int, 4> index{};
-        int count = 0;
-        for (int u = 0; u < unknowns; ++u)
-            if (set >> u & 1) index[static_cast<std::size_t>(count++)] = u;
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4> a(count, count);
-        Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1> r(count);
-        for (int i = 0; i < count; ++i) {
-            r[i] = right[index[static_cast<std::size_t>(i)]];
-            for (int j = 0; j < count; ++j)
-                a(i, j) = gram(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(j)]);
-        }
-        const auto factor = a.ldlt();
-        const auto pivots = factor.vectorD();
-        if (!(pivots.minCoeff() > 1e-14 * pivots.maxCoeff())) continue;
-        const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1> x = factor.solve(r);
-        if (!(x.minCoeff() >= 0)) continue;
-        Solution candidate;
-        for (int i = 0; i < count; ++i) {
-            const int u = index[static_cast<std::size_t>(i)];
-            (u < m ? candidate.sills[static_cast<std::size_t>(u)] : candidate.nugget) = x[i];
-        }
-        candidate.sse = sse(candidate.nugget, candidate.sills);
-        if (candidate.sse < best.sse) best = candidate;
-    }
-    return best;
-}
 
 Space makeSpace(const FitOptions& options, const Classes& classes) {
     Space space;
@@ -268,7 +171,7 @@ Solution searchFast(Problem& problem, const Space& space, const Classes& classes
     const std::vector<double> shapePoints =
         freeShape ? gridPoints(space.variables[1], shapes) : std::vector<double>{space.fixed[0].shape};
     const bool stable = problem.options().structures[0].type == StructureType::Stable;
-    std::vector<double> power(classes.size());
+    std::vector<double> power(problem.rows(), 1.0);
     for (const double shape : shapePoints) {
         if (freeShape) x[1] = shape;
         const double ratio = std::exp(-shape * (rangePoints[1] - rangePoints[0]));
@@ -280,12 +183,10 @@ Solution searchFast(Problem& problem, const Space& space, const Classes& classes
                 best = better(best, problem.solve(space.at(x)));
                 continue;
             }
-            double* column = problem.column(0);
-            for (std::size_t b = 0; b < classes.size(); ++b) {
-                column[b] = -std::expm1(-power[b]);
-                power[b] *= ratio;
-            }
-            best = better(best, problem.solveColumns(space.at(x)));
+            const Solution s = problem.solveDecay(power.data(), ratio);
+            if (!(s.sse < best.sse)) continue;
+            best = s;
+            best.shapes = space.at(x);
         }
     }
     // Golden section in the range; with a free shape, golden section in the shape over the best range of each
@@ -328,6 +229,7 @@ Solution searchFast(Problem& problem, const Space& space, const Classes& classes
 }  // namespace
 
 Solution search(Problem& problem, const Space& space, const Classes& classes) {
+    problem.setWeights();
     const bool fast = problem.options().search == FitSearch::Fast &&
                       problem.options().structures.size() == 1 &&
                       (space.variables.empty() || space.variables[0].isRange);

@@ -35,39 +35,33 @@ struct Solution {
 /// The separable problem: linear coefficients exactly, for given shapes.
 class Problem {
   public:
-    Problem(const Classes& classes, const FitOptions& options)
-        : classes_(classes), options_(options), columns_(options.structures.size() * classes.size()) {}
+    Problem(const Classes& classes, const FitOptions& options);
 
     const FitOptions& options() const { return options_; }
     int evaluations() const { return evaluations_; }
 
-    Solution solve(const Shapes& shapes) {
-        const std::size_t k = classes_.size(), m = options_.structures.size();
-        for (std::size_t s = 0; s < m; ++s)
-            for (std::size_t b = 0; b < k; ++b)
-                columns_[s * k + b] = unitSemivariance(options_.structures[s].type, shapes[s].shape,
-                                                       classes_.h[b] / shapes[s].range);
-        return solveColumns(shapes);
-    }
+    /// Takes over the weights of the classes.
+    void setWeights();
 
-    /// As solve(), the columns being filled already.
-    Solution solveColumns(const Shapes& shapes) {
-        ++evaluations_;
-        Solution solution = options_.structures.size() == 1 ? solveOne() : solveSubsets();
-        solution.shapes = shapes;
-        return solution;
-    }
+    Solution solve(const Shapes& shapes);
 
-    double* column(std::size_t s) { return columns_.data() + s * classes_.size(); }
+    /// As solve() of one structure whose unit semivariances are 1 - exp(-power), but for the shapes; then
+    /// multiplies the powers by `ratio`. `power`: rows() of them.
+    Solution solveDecay(double* power, double ratio);
+
+    /// Classes, filled up to whole vectors by ones of weight 0.
+    std::size_t rows() const { return squared_.size(); }
 
   private:
     double sse(double nugget, const std::array<double, kMaxStructures>& sills) const;
+    Solution solveColumns();
     Solution solveOne() const;
     Solution solveSubsets() const;
 
     const Classes& classes_;
     const FitOptions& options_;
-    std::vector<double> columns_;
+    std::vector<double> squared_, w_, g_;  // rows(): squared distances, weights, semivariances
+    std::vector<double> columns_;          // rows() of each structure
     int evaluations_ = 0;
 };
 

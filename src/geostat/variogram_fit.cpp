@@ -223,7 +223,7 @@ VariogramFit fitVariogram(const EmpiricalVariogram& variogram, const FitOptions&
     }
     if (options.search == FitSearch::Global)
         fit.standardErrors = parameterErrors(fit, options, classes, space, best);
-    fit.sillTest = sillTest(variogram, options.level);
+    if (options.sillTest) fit.sillTest = sillTest(variogram, options.level);
     return fit;
 }
 

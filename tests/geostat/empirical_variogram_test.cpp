@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "simulated_field.h"
+#include "variolux/geostat/lattice_variogram.h"
 
 namespace {
 
@@ -123,6 +125,50 @@ TEST(EmpiricalVariogram, EqualsTheMeanOfTheCloud) {
             sum += vlx::empiricalVariogram(x, z.col(c), withEdges(edges)).bins[b].semivariance;
         EXPECT_NEAR(v.bins[b].semivariance + v.bins[b].noise, sum, 1e-12);
     }
+}
+
+TEST(LatticeVariogram, IsTheVariogramOfItsData) {
+    const Index width = 11, height = 7;
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> uniform;
+    for (const Index channels : {1, 3, 4})
+        for (const double filled : {1.0, 0.4}) {
+            std::vector<Index> cells;
+            for (Index cell = 0; cell < width * height; ++cell)
+                if (uniform(random) < filled) cells.push_back(cell);
+            const auto n = static_cast<Index>(cells.size());
+            MatrixXd x(n, 2), z(n, channels);
+            VectorXd noise(n);
+            for (Index i = 0; i < n; ++i) {
+                const Index cell = cells[static_cast<std::size_t>(i)];
+                x.row(i) << 5 + 0.25 * static_cast<double>(cell % width),
+                    -3 + 0.25 * static_cast<double>(cell / width);
+                for (Index c = 0; c < channels; ++c) z(i, c) = 1000 + uniform(random);
+                noise[i] = uniform(random);
+            }
+            z(2, 0) = std::numeric_limits<double>::quiet_NaN();
+            noise[4] = -1;
+            const std::vector<double> edges{0, 0.25, 0.9, 1.5, 1.51, 2};
+            const auto expected = vlx::empiricalVariogram(x, z, withEdges(edges), noise);
+            const auto found = vlx::latticeVariogram({width, height, 0.25}, cells, z, edges, noise);
+            EXPECT_EQ(found.status, vlx::VariogramStatus::Ok);
+            EXPECT_EQ(found.data, expected.data);
+            EXPECT_EQ(found.skipped, 2);
+            EXPECT_NEAR(found.meanNoise, expected.meanNoise, 1e-12);
+            for (std::size_t b = 0; b < expected.bins.size(); ++b) {
+                EXPECT_EQ(found.bins[b].pairs, expected.bins[b].pairs);
+                EXPECT_NEAR(found.bins[b].distance, expected.bins[b].distance, 1e-12);
+                EXPECT_NEAR(found.bins[b].noise, expected.bins[b].noise, 1e-12);
+                if (expected.bins[b].pairs > 0) {
+                    EXPECT_NEAR(found.bins[b].semivariance, expected.bins[b].semivariance, 1e-12);
+                }
+            }
+        }
+    const VectorXd one = VectorXd::Ones(1), two = VectorXd::Ones(2);
+    EXPECT_EQ(vlx::latticeVariogram({2, 2, 1}, {3}, one, {0, 2}, one).status,
+              vlx::VariogramStatus::TooFewData);
+    EXPECT_EQ(vlx::latticeVariogram({2, 2, 1}, {0, 3}, two, {0, 1}, two).status,
+              vlx::VariogramStatus::NoPairs);
 }
 
 TEST(EmpiricalVariogram, DirectionsSplitThePairs) {

@@ -100,5 +100,68 @@ TEST(Kernels, ColumnsEqualTheModelOneValueAtATime) {
         }
 }
 
+TEST(Kernels, BlocksAreSumsOfTheirPoints) {
+    testing::Random random(2);
+    const VariogramModel model{.nugget = 0,
+                               .structures = {{StructureType::Stable, 0.7, 1.3, 2},
+                                              {StructureType::Stable, 0.2, 0.4, 0.25},
+                                              {StructureType::Spherical, 0.5, 2, 1},
+                                              {StructureType::Matern, 0.5, 2, 1.5}}};
+    for (std::size_t structures : {3, 4}) {
+        VariogramModel some = model;
+        some.structures.resize(structures);
+        const ModelColumns columns(some);
+        constexpr Index n = 200, k = 5;  // more than one chunk
+        MatrixXd places(n, 4), points(k, 4);
+        for (Index i = 0; i < n; ++i)
+            for (Index axis = 0; axis < 4; ++axis) places(i, axis) = random.normal();
+        for (Index a = 0; a < k; ++a) points.row(a) << random.normal(), random.normal(), 0.3, -0.2;
+        const VectorXd weights = VectorXd::LinSpaced(k, 0.1, 0.3);
+        for (const bool semivariance : {false, true}) {
+            VectorXd expected = VectorXd::Zero(n), one(n), found(n);
+            for (Index a = 0; a < k; ++a) {
+                const VectorXd point = points.row(a).transpose();
+                if (semivariance)
+                    columns.semivariances(places.data(), n, 4, point.data(), 0, n, one.data());
+                else
+                    columns.covariances(places.data(), n, 4, point.data(), 0, n, one.data());
+                expected += weights[a] * one;
+            }
+            columns.ofBlock(places.data(), n, points, weights.data(), n, semivariance, found.data());
+            EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-13);
+        }
+    }
+}
+
+TEST(Kernels, TrianglesAreSolvedAlikeOnEveryInstructionSet) {
+    testing::Random random(3);
+    for (const Index n : {1, 3, 4, 5, 31, 64, 101})
+        for (const Index m : {1, 8, 16, 19}) {
+            const Index leading = leadingDimension(n), step = (m + 15) / 16 * 16;
+            MatrixXd l = MatrixXd::Zero(leading, n), x = MatrixXd::Zero(step, n);
+            for (Index j = 0; j < n; ++j) {
+                for (Index i = 0; i < n; ++i) l(i, j) = random.normal() / 4;  // upper half: not read
+                l(j, j) = 1 + random.uniform();
+                for (Index t = 0; t < m; ++t) x(t, j) = random.normal();
+            }
+            const auto lower = l.topRows(n).triangularView<Eigen::Lower>();
+            for (const bool upper : {false, true}) {
+                const MatrixXd b = x.topRows(m).transpose();
+                MatrixXd expected = b;
+                upper ? lower.transpose().solveInPlace(expected) : lower.solveInPlace(expected);
+                MatrixXd first;
+                for (const InstructionSet set : available()) {
+                    MatrixXd y = x;
+                    solveTriangle(l.data(), n, leading, upper, y.data(), m, step, set);
+                    const MatrixXd found = y.topRows(m).transpose();
+                    EXPECT_LT((found - expected).cwiseAbs().maxCoeff(),
+                              1e-11 * expected.cwiseAbs().maxCoeff());
+                    if (first.size() == 0) first = found;
+                    EXPECT_TRUE((found.array() == first.array()).all()) << n << ' ' << m;
+                }
+            }
+        }
+}
+
 }  // namespace
 }  // namespace vlx::kernels

@@ -46,7 +46,7 @@ enum class FitSearch {
     /// The global minimum, SSE to 1e-9 of itself with one structure; about 0.1 ms, 1 ms with a free shape.
     Global,
     /// For tens of thousands of regions: a grid of 28 ranges (by 8 shapes) and one refinement, for 12 classes
-    /// about 15 microseconds (60 with a free shape), sill test included. SSE within 1 % of the global minimum
+    /// about 10 microseconds (35 with a free shape), sill test included. SSE within 1 % of the global minimum
     /// for 98 % of noisy variograms (the tests assert it). Several structures are searched as by Global.
     /// Iterated weights are updated three times; no parameter standard errors.
     Fast,
@@ -58,7 +58,8 @@ struct FitOptions {
     FitWeights weights = FitWeights::Pairs;
     VariogramModel reference;  ///< only for PairsPerSquaredReference
     FitSearch search = FitSearch::Global;
-    double level = 0.05;  ///< of the sill test, in (0, 1)
+    bool sillTest = true;  ///< also test whether there is structure
+    double level = 0.05;   ///< of that test, in (0, 1)
 
     /// The broken constraint in words, or nothing.
     std::optional<std::string> validate() const;
@@ -107,7 +108,7 @@ struct VariogramFit {
     /// confidence interval. Empty with FitSearch::Fast.
     Eigen::VectorXd standardErrors;
 
-    SillTest sillTest;
+    SillTest sillTest;  ///< p-value 1 without FitOptions::sillTest
 
     bool ok() const { return status == FitStatus::Ok || status == FitStatus::WeightsUnconverged; }
     std::string message() const;

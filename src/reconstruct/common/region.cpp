@@ -59,7 +59,12 @@ struct Group {
             square += grid.square.col(cell);
         }
     }
-    Eigen::ArrayXd squaresAboutMean() const { return (square - sum * sum / count).max(0.0); }
+    void clear() {
+        count = 0;
+        sum.setZero();
+        square.setZero();
+    }
+    auto squaresAboutMean() const { return (square - sum * sum / count).max(0.0); }
 };
 
 /// The pooled variance of one sample within the cells of `pixels`, of the finest size that holds two samples
@@ -68,10 +73,11 @@ std::optional<Eigen::VectorXd> varianceWithin(const Grid& grid, const std::vecto
     for (int size = 1; size <= grid.cells && grid.cells % size == 0; size *= 2) {
         Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(grid.sum.rows());
         double freedom = 0, samples = 0;
+        Group group(grid.sum.rows());
         for (const Eigen::Index pixel : pixels)
             for (int y = 0; y < grid.cells; y += size)
                 for (int x = 0; x < grid.cells; x += size) {
-                    Group group(grid.sum.rows());
+                    group.clear();
                     group.add(grid, pixel, x, y, size);
                     if (group.count == 0) continue;
                     squares += group.squaresAboutMean();

@@ -8,8 +8,8 @@
 #include "reconstruct/common/picture_scale.h"
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
-#include "variolux/geostat/empirical_variogram.h"
 #include "variolux/geostat/kriging.h"
+#include "variolux/geostat/lattice_variogram.h"
 #include "variolux/geostat/variogram_fit.h"
 
 namespace vlx {
@@ -19,6 +19,7 @@ namespace {
 constexpr int kColours = 3;  // R, G, B carry the variogram
 constexpr int kMinData = 3;  // a variogram needs two distances
 constexpr int kDistanceClasses = 12;
+constexpr int kMostCells = 5;          // for each datum: up to here the lattice's variogram is quicker
 constexpr double kMinExponent = 0.25;  // lower ones are a nugget in all but name
 
 /// A pixel's samples are as many as an adaptive sampler saw fit: they must not outweigh its neighbours'.
@@ -111,13 +112,40 @@ KrigingTargets pixelTargets(const RegionData& data, const Eigen::MatrixXd& pixel
     return targets;
 }
 
+/// Rows and columns of cells.
+Lattice latticeOf(const RegionData& data) {
+    return {Eigen::Index{data.pixels.width} * data.cellsPerPixel,
+            Eigen::Index{data.pixels.height} * data.cellsPerPixel, 1.0 / data.cellsPerPixel};
+}
+
+/// The cells of the lattice that the data lie in; empty if they are not, one by one, at centres of cells.
+std::vector<Eigen::Index> cellsOf(const RegionData& data, const Lattice& lattice) {
+    std::vector<Eigen::Index> cells;
+    for (Eigen::Index i = 0; i < data.size(); ++i) {
+        const double x = (data.positions(i, 0) - data.pixels.x) / lattice.spacing - 0.5;
+        const double y = (data.positions(i, 1) - data.pixels.y) / lattice.spacing - 0.5;
+        const bool centre = x == std::floor(x) && x >= 0 && x < static_cast<double>(lattice.width) &&
+                            y == std::floor(y) && y >= 0 && y < static_cast<double>(lattice.height);
+        const Eigen::Index cell =
+            centre ? static_cast<Eigen::Index>(y) * lattice.width + static_cast<Eigen::Index>(x) : -1;
+        if (cell < 0 || (i > 0 && cell <= cells.back())) return {};
+        cells.push_back(cell);
+    }
+    return cells;
+}
+
 /// Section 4: the empirical variogram of the cell means, less their noise, in classes up to the region's
-/// diagonal (a singular value lies beyond it, and is left out).
-EmpiricalVariogram variogramOf(const Eigen::MatrixXd& positions, const Eigen::MatrixXd& colours,
-                               const Eigen::VectorXd& errors, const Window& pixels) {
+/// diagonal (a singular value lies beyond it, and is left out). `judged`: with standard errors.
+EmpiricalVariogram variogramOf(const RegionData& data, const Eigen::MatrixXd& colours,
+                               const Eigen::VectorXd& errors, bool judged) {
     EmpiricalVariogramOptions classes;
-    classes.edges = uniformEdges(std::hypot(pixels.width, pixels.height), kDistanceClasses);
-    return empiricalVariogram(positions, colours, classes, errors);
+    classes.edges = uniformEdges(std::hypot(data.pixels.width, data.pixels.height), kDistanceClasses);
+    const Lattice lattice = latticeOf(data);
+    // A lattice that is nearly empty takes longer than its data.
+    if (!judged && lattice.width * lattice.height <= kMostCells * data.size())
+        if (const std::vector<Eigen::Index> cells = cellsOf(data, lattice); !cells.empty())
+            return latticeVariogram(lattice, cells, colours, classes.edges, errors);
+    return empiricalVariogram(data.positions, colours, classes, errors);
 }
 
 /// The stable model fitted to it; near the origin it matters most, hence the weights.
@@ -127,6 +155,7 @@ VariogramFit fitStableModel(const EmpiricalVariogram& variogram, bool nugget) {
     options.nugget = nugget;
     options.weights = FitWeights::PairsPerSquaredDistance;
     options.search = FitSearch::Fast;
+    options.sillTest = false;  // whether there is structure, the sill tells
     return fitVariogram(variogram, options);
 }
 
@@ -213,13 +242,13 @@ RegionEstimate krigeRegion(const RegionData& data, const Paper& options, bool in
 
     // Samples of the whole image with unknown errors are taken to be exact: nothing is filtered out.
     const bool exact = options.regionSize == 0 && !data.varianceKnown;
-    const EmpiricalVariogram variogram =
-        variogramOf(data.positions, differences, moments.errors, data.pixels);
+    const EmpiricalVariogram variogram = variogramOf(data, differences, moments.errors, false);
     const VariogramFit fit = fitStableModel(variogram, !exact);
     if (inspect) {
         RegionInspection& inspection = estimate.inspection;
         inspection.distance = "distance on the image plane, pixels";
-        setVariogram(inspection, variogram, data.positions, differences, moments.errors);
+        setVariogram(inspection, variogramOf(data, differences, moments.errors, true), data.positions,
+                     differences, moments.errors);
         if (fit.ok()) inspection.model = fit.model;
         if (!fit.ok()) inspection.fallbacks.push_back(fit.message());
         if (fit.rangeAtBound) inspection.fallbacks.emplace_back("the range is at the bound of its search");
