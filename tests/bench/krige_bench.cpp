@@ -9,6 +9,10 @@
 #include <algorithm>
 #include <ctime>
 #include <limits>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
 
 #include "base/simd.h"
 #include "reconstruct/drift/gram.h"
