@@ -1,4 +1,4 @@
-"""Log-log charts as SVG, for the project's tools and figures. Python 3 and its standard library only."""
+"""Charts as SVG, log-log unless told, for the project's tools and figures. Python 3 and its standard library only."""
 
 import math
 
@@ -18,21 +18,22 @@ def power_ticks(low, high, step=1):
 
 
 class Panel:
-    """Log-log axes with their frame, grid and labels."""
+    """Axes with their frame, grid and labels: logarithmic but those named in `linear` ("x", "y", "xy")."""
 
-    def __init__(self, left, x_range, y_range, width=340, height=290):
+    def __init__(self, left, x_range, y_range, width=340, height=290, linear=""):
         self.left, self.width, self.height = left, width, height
-        self.x_range = [math.log10(v) for v in x_range]
-        self.y_range = [math.log10(v) for v in y_range]
+        self.x_scale, self.y_scale = (float if axis in linear else math.log10 for axis in "xy")
+        self.x_range = [self.x_scale(v) for v in x_range]
+        self.y_range = [self.y_scale(v) for v in y_range]
         self.svg = []
 
     def x(self, v):
         low, high = self.x_range
-        return self.left + (math.log10(v) - low) / (high - low) * self.width
+        return self.left + (self.x_scale(v) - low) / (high - low) * self.width
 
     def y(self, v):
         low, high = self.y_range
-        return TOP + self.height - (math.log10(v) - low) / (high - low) * self.height
+        return TOP + self.height - (self.y_scale(v) - low) / (high - low) * self.height
 
     def text(self, x, y, text, anchor="middle", **attributes):
         more = "".join(f' {k.replace("_", "-")}="{v}"' for k, v in attributes.items())

@@ -7,6 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
+import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 BIN = os.path.join(ROOT, "build/release/bin")
@@ -31,6 +32,20 @@ def run(*command):
     if done.returncode:
         _end(command, done)
     return done.stdout
+
+
+def cost(*command):
+    """Runs as run(), and says what it took, with all that it started: processor and wall seconds, and the peak memory of its largest
+    process in bytes."""
+    command = [str(word) for word in command]
+    start = time.monotonic()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    said = process.stderr.read().decode(errors="replace")
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        _end(command, subprocess.CompletedProcess(command, process.returncode, stderr=said))
+    return used.ru_utime + used.ru_stime, time.monotonic() - start, 1024 * used.ru_maxrss
 
 
 def sweep(programs, scene, folder, *options):
@@ -58,8 +73,12 @@ def link(target, name):
     os.symlink(os.path.relpath(target, os.path.dirname(name)), name)
 
 
+def commit(options):
+    """Of the code: options.commit, if given."""
+    return options.commit or run("git", "-C", ROOT, "log", "-1", "--format=%h", "--", "include", "src", "tools/*.cpp", ":!*.md").strip()
+
+
 def stamp(options):
-    """Date, commit of the code (options.commit, if given), machine."""
-    commit = options.commit or run("git", "-C", ROOT, "log", "-1", "--format=%h", "--", "include", "src", "tools/*.cpp", ":!*.md").strip()
+    """Date, commit, machine."""
     cpu = next(line.split(":")[1].strip() for line in run("lscpu").splitlines() if line.startswith("Model name"))
-    return f"{datetime.date.today()}, commit {commit}, {cpu}, {os.cpu_count()} cores"
+    return f"{datetime.date.today()}, commit {commit(options)}, {cpu}, {os.cpu_count()} cores"

@@ -6,8 +6,7 @@
 #include <chrono>
 #include <memory>
 
-#include "../reconstruct/make_band.h"
-#include "variolux/dump/sample_buffer.h"
+#include "room_samples.h"
 #include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
@@ -15,25 +14,8 @@ namespace {
 
 constexpr Window kRoom{0, 0, 960, 540};
 
-float truth(int x, int y, int c) {
-    const float shade =
-        1 + 0.4f * std::sin(0.05f * static_cast<float>(x)) * std::cos(0.03f * static_cast<float>(y));
-    return shade * ((x / 24 + y / 24 + c) % 2 != 0 ? 0.3f : 1.f);
-}
-
-const SampleBuffer& roomSamples() {
-    static const SampleBuffer samples = [] {
-        std::mt19937 random(1);
-        std::gamma_distribution<float> noise(2, 0.5f);
-        DumpHeader header;
-        header.data = header.display = kRoom;
-        header.channels = {{"R"}, {"G"}, {"B"}, {"sample.x"}, {"sample.y"}};
-        return SampleBuffer(header, makeBand(kRoom, 8, [&](int x, int y, int i) {
-                                const float n = noise(random);
-                                return MadeSample{truth(x, y, 0) * n, truth(x, y, 1) * n, truth(x, y, 2) * n,
-                                                  stratumX(x, i), stratumY(y, i)};
-                            }));
-    }();
+const SampleBuffer& samplesOfRoom() {
+    static const SampleBuffer samples = roomSamples(kRoom, 8, false);
     return samples;
 }
 
@@ -43,7 +25,7 @@ Image denoisedRoom(int phase) {
         for (int x = 0; x < kRoom.width; ++x)
             for (int c = 0; c < 3; ++c)
                 image.at(x, y)[c] =
-                    truth(x, y, c) * (1 + 0.02f * static_cast<float>((x * 7 + y * 3 + phase) % 5 - 2));
+                    roomTruth(x, y, c) * (1 + 0.02f * static_cast<float>((x * 7 + y * 3 + phase) % 5 - 2));
     return image;
 }
 
@@ -55,7 +37,7 @@ std::shared_ptr<const SecondOpinion> roomOpinion(bool halves) {
 
 double timed(const Drift& options) {
     const auto start = std::chrono::steady_clock::now();
-    benchmark::DoNotOptimize(reconstruct(roomSamples(), options).image.pixels.data());
+    benchmark::DoNotOptimize(reconstruct(samplesOfRoom(), options).image.pixels.data());
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
