@@ -141,8 +141,9 @@ PatchTile noisyTile() {
     return tile;
 }
 
-/// Two pixels' difference in one colour: -, *, min, + and - of variances, + of scales, /, + to the sum.
-constexpr double kDifference = 8;
+/// Two pixels' difference: -, * and + of each colour; min, + and - of variances, + of scales, /, + to the
+/// sum.
+constexpr double kDifference = 15;
 /// A patch's sum by columns, then rows, and its mean.
 constexpr double kPatchSum = 4 * kPatchRadius + 1;
 
@@ -150,19 +151,38 @@ void distancesOfTile(benchmark::State& state) {
     const PatchTile tile = noisyTile();
     std::vector<float> scratch, out(kTile * kTile);
     constexpr double kSide = kTile + 2 * kPatchRadius, kDistances = kTile * kTile;
-    const double seconds = run(state, kSide * kSide * tile.channels * kDifference + kDistances * kPatchSum,
-                               out.data(), [&] { patchDistances(tile, 3, -5, scratch, out.data()); });
+    const double seconds = run(state, kSide * kSide * kDifference + kDistances * kPatchSum, out.data(),
+                               [&] { patchDistances(tile, 3, -5, scratch, out.data()); });
     state.counters["ns_per_distance"] = 1e9 * seconds / kDistances;
 }
 
 void distancesOfPixel(benchmark::State& state) {
     const PatchTile tile = noisyTile();
-    constexpr int kSide = 2 * kMaxReach + 1, kPatch = 2 * kPatchRadius + 1;
-    std::vector<float> out(kSide * kDistanceStride);
-    constexpr double kDistances = kSide * kSide;
-    const double seconds = run(state, kDistances * (kPatch * kPatch * tile.channels * kDifference + 1),
-                               out.data(), [&] { patchDistancesFrom(tile, 7, 21, out.data()); });
-    state.counters["ns_per_distance"] = 1e9 * seconds / kDistances;
+    const Surroundings around{static_cast<int>(state.range(0))};
+    const int side = 2 * around.reach + 1;
+    constexpr int kPatch = 2 * kPatchRadius + 1;
+    std::vector<float> out(static_cast<std::size_t>(around.size()));
+    const double distances = side * side;
+    const double seconds = run(state, distances * (kPatch * kPatch * kDifference + 1), out.data(),
+                               [&] { patchDistancesFrom(tile, 7, 21, around, out.data()); });
+    state.counters["ns_per_distance"] = 1e9 * seconds / distances;
+}
+
+/// Of regular centres, so many pixels apart.
+void distancesOfLattice(benchmark::State& state) {
+    const PatchTile tile = noisyTile();
+    PatchLattice lattice;
+    lattice.around = {8};
+    for (int i = 0; i < kTile; i += static_cast<int>(state.range(0))) lattice.columns.push_back(i);
+    lattice.rows = lattice.columns;
+    const std::vector<PatchLattice*> lattices{&lattice};
+    std::vector<float> scratch;
+    latticeDistances(tile, lattices, scratch);
+    const double offsets = 17 * 17, centres = static_cast<double>(lattice.rows.size() * lattice.rows.size());
+    constexpr double kSide = kTile + 2 * kPatchRadius;
+    const double seconds = run(state, offsets * (kSide * kSide * kDifference + centres * kPatchSum),
+                               lattice.distances.data(), [&] { latticeDistances(tile, lattices, scratch); });
+    state.counters["ns_per_distance"] = 1e9 * seconds / (offsets * centres);
 }
 
 void whole(benchmark::State& state) {
@@ -197,7 +217,8 @@ constexpr auto kDraft = static_cast<int>(Quality::Draft), kStandard = static_cas
 BENCHMARK(yardsticks)->Iterations(1);
 BENCHMARK(gram)->ArgName("data")->Arg(9 * 9)->Arg(17 * 17)->Arg(31 * 31);
 BENCHMARK(distancesOfTile);
-BENCHMARK(distancesOfPixel);
+BENCHMARK(distancesOfLattice)->Arg(4)->Arg(6);
+BENCHMARK(distancesOfPixel)->Arg(8)->Arg(15);
 BENCHMARK(whole)
     ->ArgNames({"width", "height", "quality", "half"})
     ->Args({480, 270, kDraft, 1})
