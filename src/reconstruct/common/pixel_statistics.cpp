@@ -112,6 +112,18 @@ double knownSquares(const SampleBand& band, const SampleLayout& layout,
     return sum / n * std::max(1.0, n - 1);
 }
 
+/// What values count as: 0 where they are not finite; features, which have a scale, saturated(value / scale).
+void countedValues(const float* in, std::size_t n, float scale, float* out) {
+    for (std::size_t i = 0; i < n; ++i) out[i] = std::isfinite(in[i]) ? in[i] : 0.f;
+    if (scale == 0) return;
+    bool beyond = false;
+    for (std::size_t i = 0; i < n; ++i) {
+        out[i] /= scale;
+        beyond |= std::abs(out[i]) > 1;
+    }
+    for (std::size_t i = 0; beyond && i < n; ++i) out[i] = saturated(out[i]);
+}
+
 }  // namespace
 
 std::vector<std::string> furtherRadiance(const DumpHeader& header, const Drift& options) {
@@ -178,12 +190,19 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
     std::vector<double> first(radiance + features), sum[2], square(radiance + features), factors;
     for (auto& s : sum) s.resize(radiance + features);
     const std::size_t alpha = layout.alpha < 0 ? radiance + features : static_cast<std::size_t>(layout.alpha);
+    // All values of the row as they count.
+    const std::size_t start = static_cast<std::size_t>(bandRow) * static_cast<std::size_t>(band.width),
+                      firstSample = band.offsets[start],
+                      samples = band.offsets[start + static_cast<std::size_t>(band.width)] - firstSample;
+    std::vector<float> values((radiance + features) * samples);
+    for (std::size_t c = 0; c < radiance + features; ++c)
+        countedValues(band.values[c].data() + firstSample, samples,
+                      c < radiance ? 0 : layout.scale[c - radiance], values.data() + c * samples);
     std::vector<std::size_t> taken, halves[2];
     std::vector<std::pair<std::uint64_t, std::size_t>> order;
     int singles = y;  // pixels of one sample so far, the first of them in half A or B by turns
     for (int x = 0; x < band.width; ++x) {
-        const std::size_t pixel = static_cast<std::size_t>(bandRow) * static_cast<std::size_t>(band.width) +
-                                  static_cast<std::size_t>(x);
+        const std::size_t pixel = start + static_cast<std::size_t>(x);
         taken.clear();
         for (std::size_t s = band.offsets[pixel]; s < band.offsets[pixel + 1]; ++s) {
             ++counts.samples;
@@ -220,9 +239,7 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         float most = -1, second = -1;
         int brightHalf = 0;
         const auto value = [&](std::size_t c, std::size_t s) {
-            const float v = band.values[c][s];
-            if (!std::isfinite(v)) return 0.0;
-            return static_cast<double>(c < radiance ? v : saturated(v / layout.scale[c - radiance]));
+            return static_cast<double>(values[c * samples + s - firstSample]);
         };
         factors.clear();
         for (int half = 0; half < 2; ++half)

@@ -21,6 +21,11 @@ VLX_WIDE inline void addScaled(const float* __restrict in, float weight, int n, 
     for (int i = 0; i < n; ++i) out[i] += weight * in[i];
 }
 
+VLX_WIDE inline void addScaled(const float* __restrict in, double weight, std::size_t n,
+                               double* __restrict out) {
+    for (std::size_t i = 0; i < n; ++i) out[i] += weight * static_cast<double>(in[i]);
+}
+
 /// out[i] = sum over d of g(d) in[i + d], g squared where asked for; nothing lies beyond the row.
 void sumAround(const std::vector<float>& in, int reach, bool squared, float* out);
 

@@ -37,11 +37,17 @@ double forgetWild(const WeightedValues& of, float square, std::vector<float>& so
     const double variance = (sums[1] - sums[0] * mean) / of.total;
     const float far = farthest(x, of.weights, of.padded, static_cast<float>(mean));
     if (far <= square || static_cast<double>(far) <= kWildVariances * variance) return variance;
+    const auto fewOf = [](auto count) {
+        return std::max<std::ptrdiff_t>(2, static_cast<std::ptrdiff_t>(kFew * static_cast<double>(count)));
+    };
+    // A wild value is farther from the others' range than that is wide, so more than half as far from a mean
+    // within it: only a few on either side can be. This spares most neighbourhoods the sorting.
+    if (countBeyond(x, of.weights, of.padded, static_cast<float>(mean), far / 4) > 2 * fewOf(n))
+        return variance;
     sorted.clear();
     for (int i = 0; i < n; ++i)
         if (of.weights[i] > 0) sorted.push_back(x[i]);
-    const auto few =
-        std::max<std::ptrdiff_t>(2, static_cast<std::ptrdiff_t>(kFew * static_cast<double>(sorted.size())));
+    const auto few = fewOf(sorted.size());
     if (static_cast<std::ptrdiff_t>(sorted.size()) <= 2 * few) return variance;
     std::nth_element(sorted.begin(), sorted.begin() + few, sorted.end());
     const float low = sorted[static_cast<std::size_t>(few)];

@@ -34,14 +34,9 @@ std::vector<double> CommonError::shares(int y) const {
         for (auto* sums : {&products, &squares, &pixels}) std::fill(sums->begin(), sums->end(), 0.0);
         for (int row = std::max(0, y - kNear); row <= std::min(height_ - 1, y + kNear); ++row) {
             const auto g = static_cast<double>(windowWeight(row - y, kNear));
-            const float* of[] = {sums_.row(CommonErrorPlanes::products(window), row),
-                                 sums_.row(CommonErrorPlanes::squares(window), row),
-                                 sums_.row(CommonErrorPlanes::pixels(window), row)};
-            for (std::size_t i = 0; i < w; ++i) {
-                products[i] += g * static_cast<double>(of[0][i]);
-                squares[i] += g * g * static_cast<double>(of[1][i]);
-                pixels[i] += g * static_cast<double>(of[2][i]);
-            }
+            addScaled(sums_.row(CommonErrorPlanes::products(window), row), g, w, products.data());
+            addScaled(sums_.row(CommonErrorPlanes::squares(window), row), g * g, w, squares.data());
+            addScaled(sums_.row(CommonErrorPlanes::pixels(window), row), g, w, pixels.data());
         }
         for (std::size_t i = 0; i < w; ++i) {
             if (!(pixels[i] > 0)) continue;

@@ -148,6 +148,17 @@ VLX_WIDE float farthest(const float* x, const float* w, int n, float mean) {
     return largest;
 }
 
+VLX_WIDE int countBeyond(const float* x, const float* w, int n, float mean, float square) {
+    EightIntegers count = {};
+    for (int i = 0; i < n; i += 8) {
+        const Eight d = load<Eight>(x + i) - mean;
+        count -= (load<Eight>(w + i) > 0) & (d * d > square);
+    }
+    int sum = 0;
+    for (int k = 0; k < 8; ++k) sum += count[k];
+    return sum;
+}
+
 VLX_WIDE void multiply(const float* x, const float* y, int n, float* products) {
     for (int i = 0; i < n; i += 8) store(products + i, load<Eight>(x + i) * load<Eight>(y + i));
 }

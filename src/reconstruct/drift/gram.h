@@ -49,6 +49,9 @@ void weightedSums(const float* x, const float* w, int n, double* sums);
 /// The largest (x - mean)^2 of n values, a multiple of 8, that have a weight.
 float farthest(const float* x, const float* w, int n, float mean);
 
+/// How many of n values, a multiple of 8, that have a weight have (x - mean)^2 > square.
+int countBeyond(const float* x, const float* w, int n, float mean, float square);
+
 /// products[i] = x_i y_i
 void multiply(const float* x, const float* y, int n, float* products);
 

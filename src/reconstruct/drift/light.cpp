@@ -43,10 +43,8 @@ Light::Shares Light::shares(int y) const {
          ++row) {
         const auto g = static_cast<double>(windowWeight(row - y, LightReach::kNear));
         for (int k = 0; k < LightPlanes::kChannels; ++k) {
-            const double weight = LightPlanes::isSquare(k) ? g * g : g;
-            const float* in = sums_.row(k, row);
-            double* sum = sums.data() + static_cast<std::size_t>(k) * w;
-            for (std::size_t i = 0; i < w; ++i) sum[i] += weight * static_cast<double>(in[i]);
+            addScaled(sums_.row(k, row), LightPlanes::isSquare(k) ? g * g : g, w,
+                      sums.data() + static_cast<std::size_t>(k) * w);
         }
     }
     Shares result;

@@ -37,7 +37,7 @@ constexpr std::uint64_t kThreadBytes = 8'000'000;
 LevelPlan planOf(Quality quality, bool coarse) {
     switch (quality) {
         case Quality::Draft:
-            return {{{8, 0.8f, 6, true}}, 3};
+            return {{{8, 0.8f, 8, true}}, 3};
         case Quality::Standard:
             break;
         case Quality::High:
