@@ -1,6 +1,7 @@
 #include "reconstruct/drift/level.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "reconstruct/drift/prefilter.h"
 #include "variolux/base/parallel.h"
@@ -126,19 +127,21 @@ void Level::krige(int until) {
     while (krigedRows_ < until) {
         const int y = krigedRows_;
         smooth(y + kTile + kTileMargin);
+        static std::atomic<std::int64_t> rowsKriged = 0;
         TileInput input{&pixels_.data, &features_,     &variances_, {radiance_}, layout_.features,
-                        layout_.group, layout_.groups, width_,      height_};
+                        layout_.group, layout_.groups, width_,      height_,     ++rowsKriged};
         // Rows that this tile row is the first to reach.
         for (RowRing& ring : sums_)
             for (int row = zeroedRows_; row < std::min(height_, y + kTile + kMaxReach); ++row)
                 std::fill_n(ring.row(0, row), width_ * ring.channels(), 0.f);
         zeroedRows_ = std::min(height_, y + kTile + kMaxReach);
         const int tiles = (width_ + kTile - 1) / kTile;
-        std::vector<NeighbourhoodCounts> counts(static_cast<std::size_t>(tiles));
+        std::vector<NeighbourhoodCounts> counts(2 * static_cast<std::size_t>(tiles));
         for (int phase = 0; phase < 2; ++phase)  // tiles of one phase do not reach each other's pixels
-            parallelFor(0, (tiles + 1 - phase) / 2, [&](std::int64_t i) {
-                const int tile = 2 * static_cast<int>(i) + phase;
-                counts[static_cast<std::size_t>(tile)] = krigeTile(input, models_, tile * kTile, y, sums_);
+            parallelFor(0, (tiles + 1 - phase) / 2 * 2, [&](std::int64_t i) {
+                const int tile = static_cast<int>(i) / 2 * 2 + phase, half = static_cast<int>(i) % 2;
+                counts[static_cast<std::size_t>(2 * tile + half)] =
+                    krigeTile(input, models_, tile * kTile, y, half, sums_);
             });
         for (const NeighbourhoodCounts& of : counts) {
             report_.neighbourhoods += of.neighbourhoods;

@@ -51,8 +51,9 @@ VLX_WIDE void rateSurroundings(const CompositeDistance& of, int centre, const Su
 /// One tile's data with their margin, in local planes of kTileSide x kTileSide.
 class Tile {
   public:
-    /// Takes a tile up; what it needs of memory is kept for the next.
+    /// Takes a tile up, unless it is there; what it needs of memory is kept for the next.
     void load(const TileInput& input, int x, int y) {
+        if (input.number == in_.number && x == x_ && y == y_) return;
         in_ = input;
         x_ = x;
         y_ = y;
@@ -248,11 +249,11 @@ class Tile {
 }  // namespace
 
 NeighbourhoodCounts krigeTile(const TileInput& input, const std::vector<NeighbourhoodModel>& models, int x,
-                              int y, std::vector<RowRing>& estimates) {
+                              int y, int half, std::vector<RowRing>& estimates) {
     static thread_local Tile tile;  // megabytes: worth keeping
     tile.load(input, x, y);
     NeighbourhoodCounts counts;
-    for (int half = 0; half < 2; ++half) tile.krige(models, half, estimates, counts);
+    tile.krige(models, half, estimates, counts);
     return counts;
 }
 

@@ -27,6 +27,7 @@ struct TileInput {
     std::vector<int> group;  ///< of each feature
     int groups = 0;
     int width = 0, height = 0;  ///< of the image
+    std::int64_t number = 0;  ///< another for other data: what a thread holds of them it does not load again
 };
 
 struct NeighbourhoodCounts {
@@ -38,9 +39,10 @@ struct NeighbourhoodCounts {
     double effective = 0;       ///< sum of effective numbers of drift functions
 };
 
-/// All neighbourhoods centred in the tile at (x, y), of all models and both halves. estimates[m] takes the
-/// sums of model m, over the tile and kMaxReach around it: tiles 2 kTile apart may run at the same time.
+/// All neighbourhoods of one half centred in the tile at (x, y), of all models. estimates[m] takes the sums
+/// of model m, over the tile and kMaxReach around it: halves, and tiles 2 kTile apart, may run at the same
+/// time.
 NeighbourhoodCounts krigeTile(const TileInput& input, const std::vector<NeighbourhoodModel>& models, int x,
-                              int y, std::vector<RowRing>& estimates);
+                              int y, int half, std::vector<RowRing>& estimates);
 
 }  // namespace vlx
