@@ -22,8 +22,8 @@ constexpr PixelRowCounts kLeadingRows{392, 256, 280};  // of a level whose sourc
 constexpr int kResidualRows = 64;                      // a tile's, and kReturnReach around
 constexpr int kFeatureRows = 200;                      // finishing looks back at them
 constexpr int kVarianceRows = 156;                     // and at these
-constexpr int kSumRows = 72;
-constexpr int kEstimateRows = 100;  // and moments
+constexpr int kSumRows = 64;                           // a tile's, and kMaxReach around: 62
+constexpr int kEstimateRows = 100;                     // and moments
 constexpr int kCombinedRows = 88;
 
 const PixelRowCounts& rowsOf(bool driven) { return driven ? kLeadingRows : kPixelRows; }

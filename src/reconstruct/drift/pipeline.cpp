@@ -27,7 +27,8 @@ constexpr int kFilledRows = 32;  // pixels of data filled at a time
 // Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them.
 constexpr int kGatheredRows = 64;   // those filled, 11 around them, and those read at a time
 constexpr int kCorrectedRows = 88;  // and differences
-constexpr int kFinishingRows = 72;  // of 32 that go out together, and the light around them
+constexpr int kCleanRows = 56;      // of 32 that go out together, and the light around them
+constexpr int kFinishingRows = 72;  // and their sums
 
 // What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries
 // that it maps, and each thread's tiles.
@@ -90,7 +91,7 @@ class Pipeline {
                   options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
           differences_(width_, halved_ ? DifferencePlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
-          clean_(width_, CleanPlanes{radiance_}.channels(), kept(kFinishingRows)),
+          clean_(width_, CleanPlanes{radiance_}.channels(), kept(kCleanRows)),
           light_(width_, LightPlanes::kChannels, kept(kFinishingRows)),
           common_(width_, CommonErrorPlanes::kChannels, kept(kFinishingRows)),
           finishing_(layout_, options, picture_, fine_.rows(), halved_ ? corrected_ : fine_.rows().combined,
