@@ -146,6 +146,9 @@ Imf::Compression compressionOf(const std::string& path, const std::string& name)
     return found->second;
 }
 
+// Images of noise: higher levels find little, and take longer.
+constexpr int kZipLevel = 2;
+
 struct ExrWriter : RowWriter {
     std::vector<std::string> channels;
     bool half;
@@ -160,6 +163,7 @@ struct ExrWriter : RowWriter {
         };
         Imf::Header header(box(display), box(window));
         header.compression() = compressionOf(path, options.compression);
+        header.zipCompressionLevel() = kZipLevel;
         for (const std::string& name : names)
             header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
         for (const auto& [name, value] : options.attributes) header.insert(name, Imf::StringAttribute(value));
