@@ -140,6 +140,22 @@ TEST(WindowSum, AlongARowIsTheSumUnderItsWeights) {
     }
 }
 
+/// By blocks: of values that do not change sign, as all that is summed over wide windows.
+TEST(WindowSum, OfAWideWindowIsAsGoodAsPixelByPixel) {
+    std::vector<float> in = randomValues(900, 10), out(in.size());
+    for (float& v : in) v = v * v;
+    for (const bool squared : {false, true}) {
+        sumAround(in, 256, squared, out.data());
+        for (int i = 0; i < 900; i += 7) {
+            double sum = 0;
+            for (int k = std::max(0, i - 256); k <= std::min(899, i + 256); ++k)
+                sum += std::pow(static_cast<double>(windowWeight(k - i, 256)), squared ? 2 : 1) *
+                       static_cast<double>(in[static_cast<std::size_t>(k)]);
+            EXPECT_NEAR(out[static_cast<std::size_t>(i)], sum, 0.01 * sum) << i;
+        }
+    }
+}
+
 /// At borders too, and with no feature at all.
 TEST(WindowSum, OfAlikePixelsIsTheSumUnderTheirLikeness) {
     constexpr int kWidth = 21, kHeight = 9, kReach = 5;

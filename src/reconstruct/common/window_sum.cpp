@@ -13,6 +13,10 @@ using simd::store;
 int lanesUp(int n) { return (n + 7) / 8 * 8; }
 
 constexpr int kChunk = 4;  // vectors that are summed at once
+// A window this wide changes so little over a block of pixels that it is summed and evaluated block by block,
+// and what lies between their centres is drawn straight.
+constexpr int kWideReach = 128;
+constexpr int kBlock = 8;
 
 /// out[i] = sum over k of weights[k] in[i + k]; both have room for whole chunks.
 VLX_WIDE void convolve(const float* in, const float* weights, int taps, int n, float* out) {
@@ -60,18 +64,41 @@ VLX_WIDE void addAlike(const AlikeRows& of, int channels, float* sums) {
 
 }  // namespace
 
-void sumAround(const std::vector<float>& in, int reach, bool squared, float* out) {
+namespace {
+
+/// sumAround() of values `step` apart.
+std::vector<float> sumAt(const std::vector<float>& in, int reach, int step, bool squared) {
     const auto n = static_cast<int>(in.size());
-    const int padded = (n + 8 * kChunk - 1) / (8 * kChunk) * 8 * kChunk;
-    std::vector<float> around(static_cast<std::size_t>(padded + 2 * reach)), weights,
+    const int taps = reach / step, padded = (n + 8 * kChunk - 1) / (8 * kChunk) * 8 * kChunk;
+    std::vector<float> around(static_cast<std::size_t>(padded + 2 * taps)), weights,
         sums(static_cast<std::size_t>(padded));
-    std::copy(in.begin(), in.end(), around.begin() + reach);
-    for (int d = -reach; d <= reach; ++d) {
-        const float g = windowWeight(d, reach);
+    std::copy(in.begin(), in.end(), around.begin() + taps);
+    for (int k = -taps; k <= taps; ++k) {
+        const float g = windowWeight(step * k, reach);
         weights.push_back(squared ? g * g : g);
     }
-    convolve(around.data(), weights.data(), 2 * reach + 1, n, sums.data());
-    std::copy_n(sums.data(), n, out);
+    convolve(around.data(), weights.data(), 2 * taps + 1, n, sums.data());
+    sums.resize(in.size());
+    return sums;
+}
+
+}  // namespace
+
+void sumAround(const std::vector<float>& in, int reach, bool squared, float* out) {
+    if (reach < kWideReach || in.size() < 2 * kBlock) {
+        const std::vector<float> sums = sumAt(in, reach, 1, squared);
+        std::copy(sums.begin(), sums.end(), out);
+        return;
+    }
+    std::vector<float> blocks((in.size() + kBlock - 1) / kBlock);
+    for (std::size_t i = 0; i < in.size(); ++i) blocks[i / kBlock] += in[i];
+    const std::vector<float> sums = sumAt(blocks, reach, kBlock, squared);
+    for (std::size_t i = 0; i < in.size(); ++i) {
+        // Between the centres of two blocks, or beyond the last.
+        const float at = (static_cast<float>(i) + 0.5f) / kBlock - 0.5f;
+        const auto left = static_cast<std::size_t>(std::clamp(at, 0.f, static_cast<float>(sums.size() - 2)));
+        out[i] = sums[left] + (at - static_cast<float>(left)) * (sums[left + 1] - sums[left]);
+    }
 }
 
 void sumAlike(const RowRing& features, int featureCount, int reach, int channels,

@@ -26,7 +26,8 @@ VLX_WIDE inline void addScaled(const float* __restrict in, double weight, std::s
     for (std::size_t i = 0; i < n; ++i) out[i] += weight * static_cast<double>(in[i]);
 }
 
-/// out[i] = sum over d of g(d) in[i + d], g squared where asked for; nothing lies beyond the row.
+/// out[i] = sum over d of g(d) in[i + d], g squared where asked for; nothing lies beyond the row. From a
+/// reach of 128 on by blocks of 8 pixels, which changes 0.1 % of it.
 void sumAround(const std::vector<float>& in, int reach, bool squared, float* out);
 
 /// Square of the difference that makes pixels unlike: a tenth of a feature's scale.
