@@ -198,6 +198,8 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
     for (std::size_t c = 0; c < radiance + features; ++c)
         countedValues(band.values[c].data() + firstSample, samples,
                       c < radiance ? 0 : layout.scale[c - radiance], values.data() + c * samples);
+    std::vector<float*> out;
+    for (int k = 0; k < planes.channels(); ++k) out.push_back(ring.row(k, y));
     std::vector<std::size_t> taken, halves[2];
     std::vector<std::pair<std::uint64_t, std::size_t>> order;
     int singles = y;  // pixels of one sample so far, the first of them in half A or B by turns
@@ -285,7 +287,9 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         counts.light += light;
         if (n > 1) counts.noise += std::max(0.0, lightSquares - light * light / n) * n / (n - 1);
         const bool known = varianceKnown(band, layout, taken);
-        const auto put = [&](int plane, double v) { ring.row(plane, y)[x] = static_cast<float>(v); };
+        const auto put = [&](int plane, double v) {
+            out[static_cast<std::size_t>(plane)][x] = static_cast<float>(v);
+        };
         const auto nA = static_cast<double>(halves[0].size());
         const auto nB = static_cast<double>(halves[1].size());
         put(planes.count(), n);
