@@ -16,9 +16,9 @@
 namespace vlx {
 namespace {
 
-constexpr int kSide = 40, kCentre = 20 * kSide + 20;
+constexpr int kPlaneSide = 40, kPlaneCentre = 20 * kPlaneSide + 20;
 
-std::vector<float> randomValues(std::size_t n, unsigned seed) {
+std::vector<float> uniformValues(std::size_t n, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> uniform(-1, 1);
     std::vector<float> values(n);
@@ -29,20 +29,20 @@ std::vector<float> randomValues(std::size_t n, unsigned seed) {
 /// Data of the surroundings of a pixel: about a third of them.
 struct Selection {
     explicit Selection(int reach) : around{reach}, alike(static_cast<std::size_t>(around.size())) {
-        const std::vector<float> values = randomValues(alike.size(), 3);
+        const std::vector<float> values = uniformValues(alike.size(), 3);
         for (int dy = -reach; dy <= reach; ++dy)
             for (int dx = -reach; dx <= reach; ++dx) {
                 const auto at = static_cast<std::size_t>(around.at(dx, dy));
                 alike[at] = std::max(0.f, values[at] - 0.3f);
-                if (alike[at] >= kLeast) places.push_back(kCentre + dy * kSide + dx);
+                if (alike[at] >= kLeast) places.push_back(kPlaneCentre + dy * kPlaneSide + dx);
             }
         const auto room = alike.size() + 8;
         list.resize(room);
         x.resize(room);
         y.resize(room);
         runs.resize(alike.size() / 8);
-        found = selectData(around, alike.data(), kLeast, kCentre, kSide, runs.data(), list.data(), x.data(),
-                           y.data());
+        found = selectData(around, alike.data(), kLeast, kPlaneCentre, kPlaneSide, runs.data(), list.data(),
+                           x.data(), y.data());
     }
     static constexpr float kLeast = 0.01f;
     Surroundings around;
@@ -56,11 +56,11 @@ TEST(Neighbourhood, DataAreThosePixelsThatAreAlike) {
     for (const int reach : {3, 4, 8, 15}) {
         const Selection of(reach);
         ASSERT_EQ(static_cast<std::size_t>(of.found.data), of.places.size());
-        const std::vector<float> plane = randomValues(kSide * kSide + 8, 5);
+        const std::vector<float> plane = uniformValues(kPlaneSide * kPlaneSide + 8, 5);
         std::vector<float> gathered(of.list.size());
         gather(plane.data(), of.runs.data(), of.found.runs, 0.25f, gathered.data());
         for (std::size_t k = 0; k < of.places.size(); ++k) {
-            const int dx = of.places[k] % kSide - 20, dy = of.places[k] / kSide - 20;
+            const int dx = of.places[k] % kPlaneSide - 20, dy = of.places[k] / kPlaneSide - 20;
             EXPECT_EQ(of.list[k], of.alike[static_cast<std::size_t>(of.around.at(dx, dy))]);
             EXPECT_FLOAT_EQ(of.x[k], static_cast<float>(dx) / static_cast<float>(reach));
             EXPECT_FLOAT_EQ(of.y[k], static_cast<float>(dy) / static_cast<float>(reach));
@@ -71,7 +71,7 @@ TEST(Neighbourhood, DataAreThosePixelsThatAreAlike) {
 
 TEST(Neighbourhood, WhatIsScatteredMeetsItsDataAndNoOtherPixel) {
     const Selection of(8);
-    std::vector<float> plane(kSide * kSide + 8, 1.f), list = of.list;
+    std::vector<float> plane(kPlaneSide * kPlaneSide + 8, 1.f), list = of.list;
     for (std::size_t k = of.places.size(); k < list.size(); ++k) list[k] = NAN;  // no datum's
     scatter(list.data(), of.runs.data(), of.found.runs, plane.data());
     std::vector<float> expected(plane.size(), 1.f);
@@ -82,8 +82,8 @@ TEST(Neighbourhood, WhatIsScatteredMeetsItsDataAndNoOtherPixel) {
 
 TEST(Neighbourhood, GramMatrixIsThatOfTheWeightedProducts) {
     constexpr int kRows = 8, kData = 40;
-    const std::vector<float> x = randomValues(kRows * kData, 7);
-    std::vector<float> w = randomValues(kData, 8), weighted(x.size());
+    const std::vector<float> x = uniformValues(kRows * kData, 7);
+    std::vector<float> w = uniformValues(kData, 8), weighted(x.size());
     for (float& v : w) v = std::abs(v);
     std::vector<double> gram(kRows * kRows);
     weightedGram(x.data(), w.data(), kRows, kData, kData, weighted.data(), gram.data());
@@ -127,7 +127,7 @@ TEST(Neighbourhood, EstimatesAddWhatTheyDifferByFromTheReference) {
 
 TEST(WindowSum, AlongARowIsTheSumUnderItsWeights) {
     for (const int n : {1, 7, 33, 200}) {
-        const std::vector<float> in = randomValues(static_cast<std::size_t>(n), 9);
+        const std::vector<float> in = uniformValues(static_cast<std::size_t>(n), 9);
         std::vector<float> out(in.size());
         sumAround(in, 16, true, out.data());
         for (int i = 0; i < n; ++i) {
@@ -142,7 +142,7 @@ TEST(WindowSum, AlongARowIsTheSumUnderItsWeights) {
 
 /// By blocks: of values that do not change sign, as all that is summed over wide windows.
 TEST(WindowSum, OfAWideWindowIsAsGoodAsPixelByPixel) {
-    std::vector<float> in = randomValues(900, 10), out(in.size());
+    std::vector<float> in = uniformValues(900, 10), out(in.size());
     for (float& v : in) v = v * v;
     for (const bool squared : {false, true}) {
         sumAround(in, 256, squared, out.data());
@@ -162,7 +162,7 @@ TEST(WindowSum, OfAlikePixelsIsTheSumUnderTheirLikeness) {
     for (const int features : {0, 3}) {
         RowRing ring(kWidth, FeaturePlanes{features}.channels(), kHeight);
         const std::vector<float> values =
-            randomValues(static_cast<std::size_t>(kWidth * kHeight * (features + 4)), 11);
+            uniformValues(static_cast<std::size_t>(kWidth * kHeight * (features + 4)), 11);
         const auto at = [&](int c, int x, int y) {
             return values[static_cast<std::size_t>((c * kHeight + y) * kWidth + x)];
         };
