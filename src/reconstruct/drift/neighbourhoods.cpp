@@ -17,8 +17,6 @@ constexpr float kCoveringWeight = 0.2f;    // a pixel less like the centres arou
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
 // Distances of centres that reach no farther are found together: they share what pixels differ by.
 constexpr int kCloseReach = 8;
-// More tolerant models take much to be alike: there only regular centres save a pixel its own.
-constexpr float kMostCoveringTolerance = 1;
 
 /// What a composite distance is made of: colour patches of the other half, in rows of whole vectors, and,
 /// where a model has them, features (FeaturePlanes, `plane` apart) with their error variances.
@@ -151,7 +149,7 @@ class Tile {
                 if (covered_[static_cast<std::size_t>(row * kTile + col)] != 0) continue;
                 ++counts.own;
                 rate(col, row, around, distancesFrom(col, row, around));
-                if (model_.tolerance <= kMostCoveringTolerance) cover(col, row, around);
+                if (model_.ownCover) cover(col, row, around);
                 krigeCentre(col, row, around, counts);
             }
     }

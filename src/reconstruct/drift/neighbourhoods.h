@@ -16,6 +16,9 @@ struct NeighbourhoodModel {
     float tolerance = 1;    ///< k of w = exp(-d / k^2)
     int stride = 4;         ///< a centre every so many pixels, at most 8
     bool features = false;  ///< unlike features weigh a datum down as well
+    /// Centres that are not regular cover others. Not where much is alike: a pixel beside a lamp needs its
+    /// own.
+    bool ownCover = true;
 };
 
 struct TileInput {

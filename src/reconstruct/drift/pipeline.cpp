@@ -42,10 +42,10 @@ LevelPlan planOf(Quality quality, bool coarse) {
         case Quality::Standard:
             break;
         case Quality::High:
-            return {{{8, 0.8f, 2, true}, {15, 3.f, 6, false}, {4, 1.f, 2, false}}, kMostFeatureReach};
+            return {{{8, 0.8f, 2, true}, {15, 3.f, 6, false, coarse}, {4, 1.f, 2, false}}, kMostFeatureReach};
     }
     if (coarse) return {{{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}}, kMostFeatureReach};
-    return {{{8, 0.8f, 4, true}, {15, 3.f, 8, false}, {4, 1.f, 3, false}}, kMostFeatureReach};
+    return {{{8, 0.8f, 4, true}, {15, 3.f, 8, false, false}, {4, 1.f, 3, false}}, kMostFeatureReach};
 }
 
 Window scaled(const Window& window, int scale) {
