@@ -92,10 +92,16 @@ TEST_F(DriftKriging, SamePixelsForAnyNumberOfThreads) {
     }
 }
 
-TEST_F(DriftKriging, BandsAreTheWholeImage) {
+/// Of pictures that are kriged at half the resolution as well, and of those that are too narrow for it: their
+/// rings are of other lengths.
+class Bands : public DriftKriging, public testing::WithParamInterface<int> {};
+
+INSTANTIATE_TEST_SUITE_P(Widths, Bands, testing::Values(40, 20));
+
+TEST_P(Bands, AreTheWholeImage) {
     Picture picture;
-    picture.window = {3, -20, 40, 733};  // rows leave the rings that hold them
-    picture.truth = [](int x, int y) { return 1 + 0.5 * std::sin(0.1 * y) + (x > 20); };
+    picture.window = {3, -20, GetParam(), 733};  // rows leave the rings that hold them
+    picture.truth = [](int x, int y) { return 1 + 0.5 * std::sin(0.1 * y) + (x > 3 + GetParam() / 2); };
     write(picture.samples());
     const Reconstruction whole = krige();
 #ifdef VARIOLUX_SANITIZED

@@ -12,16 +12,16 @@ namespace {
 
 // Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them. With
 // tiles of 32 rows, centres that reach 15, patches that reach 3 and windows that reach 11, each is what was
-// seen over heights, bands and scales of tall pictures, and 8 more; builds with assertions notice where it
-// is more.
+// seen over heights, widths, bands and scales of tall pictures, and some to spare; builds with assertions
+// notice where it is more.
 struct PixelRowCounts {
     int data, squares, raw;
 };
-constexpr PixelRowCounts kPixelRows{216, 160, 96};
+constexpr PixelRowCounts kPixelRows{248, 184, 112};
 constexpr PixelRowCounts kLeadingRows{392, 256, 280};  // of a level whose source another one drives ahead
 constexpr int kResidualRows = 64;                      // a tile's, and kReturnReach around
 constexpr int kFeatureRows = 200;                      // finishing looks back at them
-constexpr int kVarianceRows = 156;                     // and at these
+constexpr int kVarianceRows = 164;                     // and at these
 constexpr int kSumRows = 64;                           // a tile's, and kMaxReach around: 62
 constexpr int kEstimateRows = 100;                     // and moments
 constexpr int kCombinedRows = 88;
