@@ -76,7 +76,7 @@ namespace vlx {
 /// What is given up for speed: models used, and how densely neighbourhoods overlap.
 enum class Quality {
     Draft,     ///< the medium model, a neighbourhood every 8 pixels; features averaged over 7 x 7
-    Standard,  ///< three models, every 3 to 6 pixels
+    Standard,  ///< three models, every 3 to 8 pixels
     High,      ///< three models, every 2 to 3 pixels
 };
 

@@ -62,10 +62,6 @@ VLX_WIDE void addAlike(const AlikeRows& of, int channels, float* sums) {
     }
 }
 
-}  // namespace
-
-namespace {
-
 /// sumAround() of values `step` apart.
 std::vector<float> sumAt(const std::vector<float>& in, int reach, int step, bool squared) {
     const auto n = static_cast<int>(in.size());

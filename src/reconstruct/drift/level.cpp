@@ -127,7 +127,7 @@ void Level::krige(int until) {
     while (krigedRows_ < until) {
         const int y = krigedRows_;
         smooth(y + kTile + kTileMargin);
-        static std::atomic<std::int64_t> rowsKriged = 0;
+        static std::atomic<std::int64_t> rowsKriged = 0;  // of all levels: no two inputs have one number
         TileInput input{&pixels_.data, &features_,     &variances_, {radiance_}, layout_.features,
                         layout_.group, layout_.groups, width_,      height_,     ++rowsKriged};
         // Rows that this tile row is the first to reach.
