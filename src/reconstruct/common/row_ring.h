@@ -11,7 +11,8 @@ namespace vlx {
 
 /// Rows of several planes of floats, of which only the last `capacity` are kept: row y overwrites row
 /// y - capacity. Rows are counted from 0; contiguous along x; zeros until written. Builds with assertions
-/// notice who asks for a row that was overwritten: a capacity that is too small.
+/// notice who asks for a row that was overwritten: a capacity that is too small. Rows that are written in any
+/// order, by several threads, are claimed first, so that this does not depend on the order.
 class RowRing {
   public:
     RowRing() = default;
@@ -31,6 +32,15 @@ class RowRing {
     std::size_t bytes() const {
         return width_ * static_cast<std::size_t>(channels_) * static_cast<std::size_t>(capacity_) *
                sizeof(float);
+    }
+
+    /// Rows from `first` up to (not including) `end` are about to be written: those in whose places they lie
+    /// are gone, all at once.
+    void claim([[maybe_unused]] int first, [[maybe_unused]] int end) {
+#ifndef NDEBUG
+        for (int y = first; y < end; ++y) assert(isKept(y));
+        for (int y = first; y < end; ++y) assert(isKept(y));  // as well: no two share a place
+#endif
     }
 
     float* row(int channel, int y) { return values_.get() + offset(channel, y); }

@@ -30,6 +30,19 @@ const PixelRowCounts& rowsOf(bool driven) { return driven ? kLeadingRows : kPixe
 
 }  // namespace
 
+LevelPlan planOf(Quality quality, bool coarse) {
+    switch (quality) {
+        case Quality::Draft:
+            return {{{8, 0.8f, 8, true}}, 3};
+        case Quality::Standard:
+            break;
+        case Quality::High:
+            return {{{8, 0.8f, 2, true}, {15, 3.f, 6, false, coarse}, {4, 1.f, 2, false}}, kMostFeatureReach};
+    }
+    if (coarse) return {{{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}}, kMostFeatureReach};
+    return {{{8, 0.8f, 4, true}, {15, 3.f, 8, false, false}, {4, 1.f, 3, false}}, kMostFeatureReach};
+}
+
 Level::Level(const SampleLayout& layout, const DriftSteps& steps, const LevelPlan& plan, int width,
              int height, bool driven, const PictureScale& picture, Source source, DriftReport& report,
              StageClock& clock)
@@ -90,6 +103,7 @@ void Level::prefilter(int until) {
         while (prefilteredRows_ < ahead) {
             const int y = prefilteredRows_;
             source_(y + kTile + kTileMargin);
+            for (RowRing* ring : {&features_, &residuals_}) ring->claim(y, std::min(height_, y + kTile));
             parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
                 prefilterFeatures(pixels_.raw, pixels_.data, {radiance_}, layout_, featureReach_,
                                   static_cast<int>(tile) * kTile, y, width_, height_, features_, residuals_);
@@ -112,6 +126,7 @@ void Level::smooth(int until) {
     if (wider_) wider_->smooth(until / 2 + 1);
     prefilter(until + kVarianceReach);
     source_(until + kVarianceReach);
+    variances_.claim(varianceRows_, until);
     parallelFor(varianceRows_, until, [&](std::int64_t y) {
         smoothVariances(pixels_.squares, pixels_.data, {radiance_}, features_, layout_.features, picture_,
                         steps_.unseen, wider_ ? &wider_->variances_ : nullptr, static_cast<int>(y), width_,
@@ -161,6 +176,8 @@ void Level::krige(int until) {
 void Level::finish() {
     const int until = krigedRows_ == height_ ? height_ : krigedRows_ - kMaxReach;
     if (finishedRows_ >= until) return;
+    moments_.claim(finishedRows_, until);
+    for (RowRing& ring : estimates_) ring.claim(finishedRows_, until);
     parallelFor(finishedRows_, until, [&](std::int64_t y) {
         for (std::size_t m = 0; m < models_.size(); ++m) finishRow(m, static_cast<int>(y));
         fillGaps(static_cast<int>(y));
@@ -242,6 +259,7 @@ void Level::combine(int until) {
     while (combinedRows_ < until) {  // few rows at a time: the rings hold no more
         const int end = std::min(until, combinedRows_ + kTile);
         krige(end + kStackReach + kMaxReach);
+        combined_.claim(combinedRows_, end);
         parallelFor(combinedRows_, end,
                     [&](std::int64_t y) { combination_.combineRow(static_cast<int>(y), steps_.stacking); });
         combinedRows_ = end;

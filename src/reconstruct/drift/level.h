@@ -30,6 +30,9 @@ struct LevelPlan {
     int featureReach;  ///< of prefilterFeatures()
 };
 
+/// `coarse`: of half the resolution.
+LevelPlan planOf(Quality quality, bool coarse);
+
 /// Stages, each a ring of rows that is filled just ahead of what the next one needs.
 class Level {
   public:

@@ -35,19 +35,6 @@ constexpr int kFinishingRows = 72;  // and their sums
 constexpr std::uint64_t kProcessBytes = 150'000'000;
 constexpr std::uint64_t kThreadBytes = 8'000'000;
 
-LevelPlan planOf(Quality quality, bool coarse) {
-    switch (quality) {
-        case Quality::Draft:
-            return {{{8, 0.8f, 8, true}}, 3};
-        case Quality::Standard:
-            break;
-        case Quality::High:
-            return {{{8, 0.8f, 2, true}, {15, 3.f, 6, false, coarse}, {4, 1.f, 2, false}}, kMostFeatureReach};
-    }
-    if (coarse) return {{{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}}, kMostFeatureReach};
-    return {{{8, 0.8f, 4, true}, {15, 3.f, 8, false, false}, {4, 1.f, 3, false}}, kMostFeatureReach};
-}
-
 Window scaled(const Window& window, int scale) {
     return {window.x * scale, window.y * scale, window.width * scale, window.height * scale};
 }
@@ -226,6 +213,7 @@ class Pipeline {
             clock_.addTo("read");
             std::vector<GatherCounts> counts(static_cast<std::size_t>(rows));
             const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;
+            gathered_.claim(first, first + rows);
             parallelFor(0, rows, [&](std::int64_t row) {
                 counts[static_cast<std::size_t>(row)] =
                     gatherRow(band, layout_, planes_, static_cast<int>(row), clamp, gathered_,
@@ -255,6 +243,7 @@ class Pipeline {
             const int first = filledRows_, end = std::min(height_, first + kFilledRows);
             gather(end + PixelData::reach(options_.scale));
             pixels_.prepare(first, end);
+            fine_.pixels().claim(first, end);
             std::vector<LimitedRow> limited(static_cast<std::size_t>(end - first));
             parallelFor(first, end, [&](std::int64_t y) {
                 limited[static_cast<std::size_t>(y - first)] = pixels_.fillRow(static_cast<int>(y));
@@ -266,11 +255,13 @@ class Pipeline {
                 drift_.farPixels += of.farPixels;
                 removed_ += of.luminance;
             }
-            if (coarse_)
+            if (coarse_) {
+                coarse_->pixels().claim(first / 2, (end + 1) / 2);
                 parallelFor(first / 2, (end + 1) / 2, [&](std::int64_t y) {
                     halveRow(fine_.pixels(), width_, height_, radiance_, layout_.features,
                              static_cast<int>(y), coarse_->pixels());
                 });
+            }
             filledRows_ = end;
             clock_.addTo("statistics");
         }
@@ -283,9 +274,11 @@ class Pipeline {
         const int differences = std::min(height_, until + Correction::kReach);
         fine_.combine(fineBelow(differences - 1));
         coarse_->combine((differences - 1) / 2 + 2);
+        differences_.claim(differenceRows_, differences);
         parallelFor(differenceRows_, differences,
                     [&](std::int64_t y) { correction_->differenceRow(static_cast<int>(y)); });
         differenceRows_ = differences;
+        corrected_.claim(correctedRows_, until);
         parallelFor(correctedRows_, until,
                     [&](std::int64_t y) { correction_->correctRow(static_cast<int>(y)); });
         correctedRows_ = until;
@@ -294,14 +287,17 @@ class Pipeline {
 
     void clean(int until) {
         until = std::min(until, height_);
-        if (cleanRows_ >= until) return;
-        correct(until + Finishing::kAlikeReach);
-        parallelFor(cleanRows_, until, [&](std::int64_t y) {
-            finishing_.cleanRow(static_cast<int>(y));
-            finishing_.errorRow(static_cast<int>(y));
-        });
-        cleanRows_ = until;
-        clock_.addTo("finishing");
+        while (cleanRows_ < until) {  // few rows at a time: the rings hold no more
+            const int end = std::min(until, cleanRows_ + kTile);
+            correct(end + Finishing::kAlikeReach);
+            for (RowRing* ring : {&clean_, &light_, &common_}) ring->claim(cleanRows_, end);
+            parallelFor(cleanRows_, end, [&](std::int64_t y) {
+                finishing_.cleanRow(static_cast<int>(y));
+                finishing_.errorRow(static_cast<int>(y));
+            });
+            cleanRows_ = end;
+            clock_.addTo("finishing");
+        }
     }
 
     void finish(int until) {

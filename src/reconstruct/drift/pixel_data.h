@@ -21,6 +21,10 @@ struct PixelRows {
     RowRing data;     ///< DataPlanes
     RowRing squares;  ///< SquaresPlanes
     RowRing raw;      ///< FeaturePlanes
+
+    void claim(int first, int end) {
+        for (RowRing* ring : {&data, &squares, &raw}) ring->claim(first, end);
+    }
 };
 
 /// What was taken off the fireflies of a row, and what was filled in.
