@@ -15,8 +15,11 @@ using simd::load;
 
 constexpr float kCoveringWeight = 0.2f;    // a pixel less like the centres around it gets its own
 constexpr float kCoveringVariance = 0.5f;  // likewise when they are noisier than it by more than this
-// Distances of centres that reach no farther are found together: they share what pixels differ by.
-constexpr int kCloseReach = 8;
+/// Whether distances of a model's regular centres are found together: where their patches overlap, and so do
+/// the pixels that they are compared with, they share what pixels differ by.
+bool isClose(const NeighbourhoodModel& model) {
+    return model.reach <= 8 && model.stride <= 2 * kPatchRadius + 1;
+}
 
 /// What a composite distance is made of: colour patches of the other half, in rows of whole vectors, and,
 /// where a model has them, features (FeaturePlanes, `plane` apart) with their error variances.
@@ -96,7 +99,7 @@ class Tile {
             lattice.around = {models[m].reach};
             lattice.columns = regular(0, columns(), x_, models[m].stride);
             lattice.rows = regular(0, rows(), y_, models[m].stride);
-            if (models[m].reach <= kCloseReach) close.push_back(&lattice);
+            if (isClose(models[m])) close.push_back(&lattice);
         }
         latticeDistances(guides_[1 - half], close, scratch_);
         for (std::size_t m = 0; m < models.size(); ++m) {
@@ -134,7 +137,7 @@ class Tile {
             for (std::size_t i = 0; i < lattice.columns.size(); ++i) {
                 const int col = lattice.columns[i], row = lattice.rows[j];
                 const float* distances = lattice.of(i, j);
-                if (model_.reach > kCloseReach) distances = distancesFrom(col, row, lattice.around);
+                if (!isClose(model_)) distances = distancesFrom(col, row, lattice.around);
                 rate(col, row, lattice.around, distances);
                 cover(col, row, lattice.around);
                 krigeCentre(col, row, lattice.around, counts);
