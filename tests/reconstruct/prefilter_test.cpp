@@ -1,6 +1,6 @@
 // Features of two halves: what is noise and what is not, and how much of either is left.
 
-#include "reconstruct/drift/prefilter.h"
+#include "reconstruct/data/prefilter.h"
 
 #include <gtest/gtest.h>
 

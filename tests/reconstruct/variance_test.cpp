@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "reconstruct/drift/prefilter.h"
+#include "reconstruct/data/prefilter.h"
 
 namespace vlx {
 namespace {

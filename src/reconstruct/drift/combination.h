@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "reconstruct/drift/pixel_data.h"
+#include "reconstruct/data/pixel_data.h"
 #include "reconstruct/drift/stacking.h"
 
 /// From the models' estimates of the halves to one estimate, with its variance: drift.h, 5.

@@ -11,79 +11,7 @@ namespace {
 
 constexpr double kPrior = 10;  // l, in data: of a weight of one half
 
-/// Calls f(x, y) for the fine pixels that a coarse pixel stands for.
-template <class F>
-void forParts(int width, int height, int x, int y, F f) {
-    for (int row = 2 * y; row < std::min(height, 2 * y + 2); ++row)
-        for (int col = 2 * x; col < std::min(width, 2 * x + 2); ++col) f(col, row);
-}
-
 }  // namespace
-
-void halveRow(const PixelRows& fine, int width, int height, int radiance, int features, int y,
-              PixelRows& coarse) {
-    const DataPlanes planes{radiance};
-    const RowRing& data = fine.data;
-    for (int x = 0; 2 * x < width; ++x) {
-        const auto put = [&](RowRing& ring, int plane, double value) {
-            ring.row(plane, y)[x] = static_cast<float>(value);
-        };
-        double parts = 0, stated = 1, count = 0, gap = std::numeric_limits<double>::infinity();
-        forParts(width, height, x, y, [&](int col, int row) {
-            ++parts;
-            stated = std::min(stated, static_cast<double>(data.row(planes.stated(), row)[col]));
-            gap = std::min(gap, static_cast<double>(data.row(planes.gap(), row)[col]));
-        });
-        for (int half = 0; half < 2; ++half) {
-            double known = 0, inverse = 0;
-            forParts(width, height, x, y, [&](int col, int row) {
-                const float n = data.row(planes.halfCount(half), row)[col];
-                if (n <= 0) return;
-                ++known;
-                inverse += 1 / static_cast<double>(n);
-            });
-            const double samples = known > 0 ? known * known / inverse : 0;
-            put(coarse.data, planes.halfCount(half), samples);
-            count += samples;
-            for (int c = 0; c < planes.radiance; ++c) {
-                double sum = 0;
-                forParts(width, height, x, y, [&](int col, int row) {
-                    if (known > 0 && data.row(planes.halfCount(half), row)[col] <= 0) return;
-                    sum += static_cast<double>(data.row(planes.mean(half) + c, row)[col]);
-                });
-                put(coarse.data, planes.mean(half) + c, sum / (known > 0 ? known : parts));
-            }
-        }
-        put(coarse.data, planes.count(), count);
-        put(coarse.data, planes.stated(), stated);
-        put(coarse.data, planes.gap(), gap / 2);
-        for (int k = 0; k < SquaresPlanes::kChannels; ++k) {
-            double sum = 0;
-            forParts(width, height, x, y,
-                     [&](int col, int row) { sum += static_cast<double>(fine.squares.row(k, row)[col]); });
-            put(coarse.squares, k, sum);
-        }
-        const FeaturePlanes raw{features};
-        for (int f = 0; f < features; ++f) {
-            double value = 0, error = 0, ofHalf[2] = {}, known[2] = {};
-            forParts(width, height, x, y, [&](int col, int row) {
-                const double mean = fine.raw.row(raw.value(f), row)[col];
-                const double difference = fine.raw.row(raw.difference(f), row)[col];
-                value += mean;
-                error += static_cast<double>(fine.raw.row(raw.error(f), row)[col]);
-                for (int half = 0; half < 2; ++half) {
-                    if (data.row(planes.halfCount(half), row)[col] <= 0) continue;
-                    ofHalf[half] += half == 0 ? mean + difference : mean - difference;
-                    ++known[half];
-                }
-            });
-            put(coarse.raw, raw.value(f), value / parts);
-            put(coarse.raw, raw.error(f), error / (parts * parts));
-            const bool both = known[0] > 0 && known[1] > 0;
-            put(coarse.raw, raw.difference(f), both ? (ofHalf[0] / known[0] - ofHalf[1] / known[1]) / 2 : 0);
-        }
-    }
-}
 
 void Correction::differenceRow(int y) {
     const int width = coarse_.width, planes = planes_.radiance + 6;  // the value's and the halves'

@@ -6,17 +6,6 @@
 /// The picture kriged once more at half its resolution, and the two combined: drift.h, 6.
 namespace vlx {
 
-/// A picture less wide or high is kriged at its own resolution only.
-inline constexpr int kLeastHalved = 32;
-
-/// Rows of `fine` that row y of the coarse level stands for: 2 y and 2 y + 1, or the last.
-/// The data of each 2 x 2 pixels as one: means of the halves, which stay the same samples; counts k^2 / sum
-/// 1/n of k pixels with data, so that a variance over a count stays the error variance; sums of squares and
-/// degrees of freedom added; features averaged with their error variances. `width` and `height` are the fine
-/// level's. Fills row y of coarse.
-void halveRow(const PixelRows& fine, int width, int height, int radiance, int features, int y,
-              PixelRows& coarse);
-
 /// L - K, where L = K + up(C - down(K)) corrects the fine level's estimate K by the coarse one's C, and what
 /// stacking needs of it. Refers to its levels and rings. Rows may be worked on at the same time.
 class Correction {

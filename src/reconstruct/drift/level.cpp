@@ -3,92 +3,63 @@
 #include <algorithm>
 #include <atomic>
 
-#include "reconstruct/drift/prefilter.h"
 #include "variolux/base/parallel.h"
 
 namespace vlx {
 
 namespace {
 
-// Rows kept at each stage: what later stages look back at, and as far ahead as it is filled for them. With
-// tiles of 32 rows, centres that reach 15, patches that reach 3 and windows that reach 11, each is what was
-// seen over heights, widths, bands and scales of tall pictures, and some to spare; builds with assertions
-// notice where it is more.
-struct PixelRowCounts {
-    int data, squares, raw;
-};
-constexpr PixelRowCounts kPixelRows{248, 184, 112};
-constexpr PixelRowCounts kLeadingRows{392, 256, 280};  // of a level whose source another one drives ahead
-constexpr int kResidualRows = 64;                      // a tile's, and kReturnReach around
-constexpr int kFeatureRows = 200;                      // finishing looks back at them
-constexpr int kVarianceRows = 164;                     // and at these
+// Rows kept at each stage, likewise (level_data.cpp).
 constexpr int kSumRows = 64;                           // a tile's, and kMaxReach around: 62
 constexpr int kEstimateRows = 100;                     // and moments
 constexpr int kCombinedRows = 88;
 
-const PixelRowCounts& rowsOf(bool driven) { return driven ? kLeadingRows : kPixelRows; }
-
 }  // namespace
 
-LevelPlan planOf(Quality quality, bool coarse) {
+std::vector<NeighbourhoodModel> modelsOf(Quality quality, bool coarse) {
     switch (quality) {
         case Quality::Draft:
-            return {{{8, 0.8f, 8, true}}, 3};
+            return {{8, 0.8f, 8, true}};
         case Quality::Standard:
             break;
         case Quality::High:
-            return {{{8, 0.8f, 2, true}, {15, 3.f, 6, false, coarse}, {4, 1.f, 2, false}}, kMostFeatureReach};
+            return {{8, 0.8f, 2, true}, {15, 3.f, 6, false, coarse}, {4, 1.f, 2, false}};
     }
-    if (coarse) return {{{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}}, kMostFeatureReach};
-    return {{{8, 0.8f, 4, true}, {15, 3.f, 8, false, false}, {4, 1.f, 3, false}}, kMostFeatureReach};
+    if (coarse) return {{8, 0.8f, 5, true}, {15, 3.f, 8, false}, {4, 1.f, 4, false}};
+    return {{8, 0.8f, 4, true}, {15, 3.f, 8, false, false}, {4, 1.f, 3, false}};
 }
 
-Level::Level(const SampleLayout& layout, const DriftSteps& steps, const LevelPlan& plan, int width,
-             int height, bool driven, const PictureScale& picture, Source source, DriftReport& report,
-             StageClock& clock)
+Level::Level(const SampleLayout& layout, const Drift& options, bool coarse, LevelData& data,
+             DriftReport& report, StageClock& clock)
     : layout_(layout),
-      steps_(steps),
-      featureReach_(steps.prefilter ? plan.featureReach : 0),
-      models_(plan.models),
-      width_(width),
-      height_(height),
+      steps_(options.steps),
+      models_(modelsOf(options.quality, coarse)),
+      data_(data),
+      width_(data.width()),
+      height_(data.height()),
       radiance_(layout.radiance),
-      picture_(picture),
-      source_(std::move(source)),
       report_(report),
       clock_(clock),
-      pixels_{RowRing(width, DataPlanes{radiance_}.channels(), kept(rowsOf(driven).data)),
-              RowRing(width, SquaresPlanes::kChannels, kept(rowsOf(driven).squares)),
-              RowRing(width, FeaturePlanes{layout.features}.rawChannels(), kept(rowsOf(driven).raw))},
-      features_(width, FeaturePlanes{layout.features}.channels(), kept(kFeatureRows)),
-      residuals_(width, ResidualPlanes{layout.groups}.channels(), kept(kResidualRows)),
-      variances_(width, VariancePlanes::kChannels, kept(kVarianceRows)),
-      moments_(width, MomentPlanes{static_cast<int>(models_.size())}.channels(), kept(kEstimateRows)),
-      combined_(width, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
-      combination_(radiance_, width, height, pixels_.data, variances_, estimates_, moments_, combined_) {
+      moments_(width_, MomentPlanes{static_cast<int>(models_.size())}.channels(), kept(kEstimateRows)),
+      combined_(width_, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
+      combination_(radiance_, width_, height_, data.data(), data.variances(), estimates_, moments_,
+                   combined_) {
     for (std::size_t m = 0; m < models_.size(); ++m) {
-        sums_.emplace_back(width, EstimatePlanes{radiance_}.channels(), kept(kSumRows));
-        estimates_.emplace_back(width, ModelPlanes{radiance_}.channels(), kept(kEstimateRows));
+        sums_.emplace_back(width_, EstimatePlanes{radiance_}.channels(), kept(kSumRows));
+        estimates_.emplace_back(width_, ModelPlanes{radiance_}.channels(), kept(kEstimateRows));
     }
 }
 
 int Level::startAbove(int first) {
-    const auto tileAbove = [](int row) { return std::max(0, row) / kTile * kTile; };
     combinedRows_ = std::max(0, first);
     finishedRows_ = std::max(0, first - kStackReach);
-    krigedRows_ = tileAbove(finishedRows_ - kMaxReach);
+    krigedRows_ = std::max(0, finishedRows_ - kMaxReach) / kTile * kTile;
     zeroedRows_ = std::max(0, krigedRows_ - kMaxReach);
-    varianceRows_ = std::max(0, krigedRows_ - kTileMargin);
-    featureRows_ = std::max(0, varianceRows_ - kVarianceReach);
-    prefilteredRows_ = tileAbove(featureRows_ - kReturnReach);
-    return std::max(0, prefilteredRows_ - kTileMargin);
+    return std::max(0, krigedRows_ - kTileMargin);
 }
 
 std::uint64_t Level::ringBytes() const {
-    std::uint64_t bytes = 0;
-    for (const RowRing* ring : {&pixels_.data, &pixels_.squares, &pixels_.raw, &features_, &residuals_,
-                                &variances_, &moments_, &combined_})
-        bytes += ring->bytes();
+    std::uint64_t bytes = moments_.bytes() + combined_.bytes();
     for (const auto* list : {&sums_, &estimates_})
         for (const RowRing& ring : *list) bytes += ring.bytes();
     return bytes;
@@ -96,55 +67,15 @@ std::uint64_t Level::ringBytes() const {
 
 // Each stage fills rows up to (not including) `until`, cut to the picture, after the stages that it needs.
 
-void Level::prefilter(int until) {
-    until = std::min(until, height_);
-    while (featureRows_ < until) {
-        const int ahead = std::min(height_, featureRows_ + 1 + kReturnReach);
-        while (prefilteredRows_ < ahead) {
-            const int y = prefilteredRows_;
-            source_(y + kTile + kTileMargin);
-            for (RowRing* ring : {&features_, &residuals_}) ring->claim(y, std::min(height_, y + kTile));
-            parallelFor(0, (width_ + kTile - 1) / kTile, [&](std::int64_t tile) {
-                prefilterFeatures(pixels_.raw, pixels_.data, {radiance_}, layout_, featureReach_,
-                                  static_cast<int>(tile) * kTile, y, width_, height_, features_, residuals_);
-            });
-            prefilteredRows_ = std::min(height_, y + kTile);
-        }
-        const int end = prefilteredRows_ == height_ ? height_ : prefilteredRows_ - kReturnReach;
-        parallelFor(featureRows_, end, [&](std::int64_t y) {
-            returnResiduals(pixels_.raw, residuals_, layout_, static_cast<int>(y), width_, height_,
-                            features_);
-        });
-        featureRows_ = end;
-        clock_.addTo("features");
-    }
-}
-
-void Level::smooth(int until) {
-    until = std::min(until, height_);
-    if (varianceRows_ >= until) return;
-    if (wider_) wider_->smooth(until / 2 + 1);
-    prefilter(until + kVarianceReach);
-    source_(until + kVarianceReach);
-    variances_.claim(varianceRows_, until);
-    parallelFor(varianceRows_, until, [&](std::int64_t y) {
-        smoothVariances(pixels_.squares, pixels_.data, {radiance_}, features_, layout_.features, picture_,
-                        steps_.unseen, wider_ ? &wider_->variances_ : nullptr, static_cast<int>(y), width_,
-                        height_, variances_);
-    });
-    varianceRows_ = until;
-    clock_.addTo("variances");
-}
-
 /// Neighbourhoods centred in rows up to `until`.
 void Level::krige(int until) {
     until = std::min(until, height_);
     while (krigedRows_ < until) {
         const int y = krigedRows_;
-        smooth(y + kTile + kTileMargin);
+        data_.fill(y + kTile + kTileMargin);
         static std::atomic<std::int64_t> rowsKriged = 0;  // of all levels: no two inputs have one number
-        TileInput input{&pixels_.data, &features_,     &variances_, {radiance_}, layout_.features,
-                        layout_.group, layout_.groups, width_,      height_,     ++rowsKriged};
+        TileInput input{&data_.data(), &data_.features(), &data_.variances(), {radiance_}, layout_.features,
+                        layout_.group, layout_.groups,    width_,             height_,     ++rowsKriged};
         // Rows that this tile row is the first to reach.
         for (RowRing& ring : sums_)
             for (int row = zeroedRows_; row < std::min(height_, y + kTile + kMaxReach); ++row)
@@ -194,9 +125,9 @@ void Level::finishRow(std::size_t m, int y) {
     for (int x = 0; x < width_; ++x) {
         double variance[3] = {};
         double leverage = 0;
-        const float gap = pixels_.data.row(data.gap(), y)[x];
+        const float gap = data_.data().row(data.gap(), y)[x];
         double perSample = 1e-300;  // of noise, over colours
-        for (int c = 0; c < 3; ++c) perSample += static_cast<double>(variances_.row(c, y)[x]) / 3;
+        for (int c = 0; c < 3; ++c) perSample += static_cast<double>(data_.variances().row(c, y)[x]) / 3;
         for (int half = 0; half < 2; ++half) {
             const int first = half * planes.perHalf();
             // A half without data here takes the other's estimate.
@@ -207,18 +138,18 @@ void Level::finishRow(std::size_t m, int y) {
             for (int c = 0; c < radiance_; ++c) {
                 float& estimate = estimates_[m].row(out.half(half) + c, y)[x];
                 if (weight <= 0) {  // no neighbourhood with data reaches it
-                    estimate = pixels_.data.row(data.mean(half) + c, y)[x];
+                    estimate = data_.data().row(data.mean(half) + c, y)[x];
                     // Of a gap's pixel the semivariance at its distance is added in the end.
-                    if (c < 3 && gap == 0) variance[c] += 2 * static_cast<double>(variances_.row(c, y)[x]);
+                    if (c < 3 && gap == 0) variance[c] += 2 * static_cast<double>(data_.variances().row(c, y)[x]);
                     continue;
                 }
                 const double shift = sums_[m].row(from + planes.sum(c), y)[x] / weight;
-                estimate = static_cast<float>(reference(pixels_.data, data, c, x, y) + shift);
+                estimate = static_cast<float>(reference(data_.data(), data, c, x, y) + shift);
                 if (c >= 3) continue;
                 const double spread =
                     std::max(0.0, sums_[m].row(from + planes.square(c), y)[x] / weight - shift * shift);
                 const double kriging = sums_[m].row(from + planes.variance(), y)[x] / weight;
-                const double own = kriging * static_cast<double>(variances_.row(c, y)[x]) / perSample;
+                const double own = kriging * static_cast<double>(data_.variances().row(c, y)[x]) / perSample;
                 variance[c] += spread + std::max(0.0, own - spread) / 2;
             }
         }
@@ -239,13 +170,13 @@ void Level::fillGaps(int y) {
         if (models_[m].reach > models_[widest].reach) widest = m;
     const auto mix = [](float& value, float other, float share) { value += share * (other - value); };
     for (int x = 0; x < width_; ++x) {
-        const float gap = pixels_.data.row(data.gap(), y)[x];
+        const float gap = data_.data().row(data.gap(), y)[x];
         if (gap == 0) continue;
         const auto share = [&](std::size_t m) {
             return std::clamp(2 * gap / static_cast<float>(models_[m].reach) - 1, 0.f, 1.f);
         };
         for (int k = 0; k < 2 * radiance_; ++k)
-            mix(estimates_[widest].row(k, y)[x], pixels_.data.row(k, y)[x], share(widest));
+            mix(estimates_[widest].row(k, y)[x], data_.data().row(k, y)[x], share(widest));
         for (int c = 0; c < 3; ++c)
             mix(estimates_[widest].row(planes.variance() + c, y)[x], 0, share(widest));
         for (std::size_t m = 0; m < models_.size(); ++m)

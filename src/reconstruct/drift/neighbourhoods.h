@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "reconstruct/drift/patch_similarity.h"
-#include "reconstruct/drift/pixel_data.h"
+#include "reconstruct/data/pixel_data.h"
 
 /// Kriging in overlapping neighbourhoods: the estimates of one tile's centres, added to the pixels they
 /// reach.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 
@@ -87,5 +88,23 @@ class PixelData {
     PixelRows& out_;
     std::unique_ptr<GapField> far_;
 };
+
+/// Calls f(x, y) for the fine pixels that a pixel of half the resolution stands for.
+template <class F>
+void forParts(int width, int height, int x, int y, F f) {
+    for (int row = 2 * y; row < std::min(height, 2 * y + 2); ++row)
+        for (int col = 2 * x; col < std::min(width, 2 * x + 2); ++col) f(col, row);
+}
+
+/// A picture less wide or high is kriged at its own resolution only.
+inline constexpr int kLeastHalved = 32;
+
+/// Rows of `fine` that row y of the coarse level stands for: 2 y and 2 y + 1, or the last.
+/// The data of each 2 x 2 pixels as one: means of the halves, which stay the same samples; counts k^2 / sum
+/// 1/n of k pixels with data, so that a variance over a count stays the error variance; sums of squares and
+/// degrees of freedom added; features averaged with their error variances. `width` and `height` are the fine
+/// level's. Fills row y of coarse.
+void halveRow(const PixelRows& fine, int width, int height, int radiance, int features, int y,
+              PixelRows& coarse);
 
 }  // namespace vlx

@@ -1,4 +1,4 @@
-#include "reconstruct/drift/prefilter.h"
+#include "reconstruct/data/prefilter.h"
 
 #include <algorithm>
 #include <cmath>
