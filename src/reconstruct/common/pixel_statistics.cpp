@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
@@ -13,6 +14,7 @@ namespace {
 
 constexpr int kScaleRows = 16;
 constexpr double kScalePercentile = 0.99;
+constexpr float kMostMotion = 1e5f;  // pixels: what moves farther in a frame is not known
 constexpr float kMedians = 4;  // of a feature's magnitude: its scale, at most
 
 void addFeatures(const DumpHeader& header, const std::vector<std::string>& channels, SampleLayout& layout) {
@@ -173,6 +175,13 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const Drift& options) 
         layout.position = static_cast<int>(layout.names.size());
         layout.names.insert(layout.names.end(), {"sample.x", "sample.y"});
     }
+    if (options.temporal > 0 &&
+        std::all_of(std::begin(kMotionChannels), std::end(kMotionChannels), [&](std::string_view channel) {
+            return findChannel(header, std::string(channel)) >= 0;
+        })) {
+        layout.motion = static_cast<int>(layout.names.size());
+        layout.names.insert(layout.names.end(), std::begin(kMotionChannels), std::end(kMotionChannels));
+    }
     if (std::all_of(
             std::begin(kVarianceChannels), std::end(kVarianceChannels),
             [&](std::string_view channel) { return findChannel(header, std::string(channel)) >= 0; })) {
@@ -180,6 +189,26 @@ SampleLayout chooseSampleLayout(const SampleSource& dump, const Drift& options) 
         layout.names.insert(layout.names.end(), std::begin(kVarianceChannels), std::end(kVarianceChannels));
     }
     return layout;
+}
+
+void gatherMotion(const SampleBand& band, const SampleLayout& layout, int bandRow, int scale, RowRing& ring,
+                  int y) {
+    const std::size_t start = static_cast<std::size_t>(bandRow) * static_cast<std::size_t>(band.width);
+    for (int x = 0; x < band.width; ++x) {
+        double sum[MotionPlanes::kChannels] = {}, count[MotionPlanes::kChannels] = {};
+        const std::size_t pixel = start + static_cast<std::size_t>(x);
+        for (std::size_t s = band.offsets[pixel]; s < band.offsets[pixel + 1]; ++s)
+            for (std::size_t k = 0; k < MotionPlanes::kChannels; ++k) {
+                const float value = band.values[static_cast<std::size_t>(layout.motion) + k][s];
+                if (!(std::abs(value) <= kMostMotion)) continue;
+                sum[k] += static_cast<double>(value);
+                ++count[k];
+            }
+        for (std::size_t k = 0; k < MotionPlanes::kChannels; ++k)
+            ring.row(static_cast<int>(k), y)[x] =
+                count[k] > 0 ? static_cast<float>(scale * sum[k] / count[k])
+                             : std::numeric_limits<float>::quiet_NaN();
+    }
 }
 
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,

@@ -27,6 +27,7 @@ struct SampleLayout {
     bool independentHalves = false;  ///< DumpHeader's, of the samples as they are gathered
     int replicate = -1;              ///< index in `names`
     int position = -1;  ///< index in `names` of sample.x, sample.y after it; where they are needed
+    int motion = -1;  ///< index in `names` of the first of kMotionChannels, all four of which are there
     int variance = -1;  ///< index in `names` of the first of kVarianceChannels, all three of which are there
 };
 
@@ -74,5 +75,10 @@ struct GatherCounts {
 /// the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,
                        int bandRow, double clamp, RowRing& ring, int y);
+
+/// Gathers one row's motion (MotionPlanes) in pixels of the picture, `scale` of which are one of the dump:
+/// means over the samples whose motion is known.
+void gatherMotion(const SampleBand& band, const SampleLayout& layout, int bandRow, int scale, RowRing& ring,
+                  int y);
 
 }  // namespace vlx

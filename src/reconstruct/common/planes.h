@@ -62,6 +62,14 @@ struct FeaturePlanes {
     int rawChannels() const { return 3 * features; }
 };
 
+/// Where a pixel's point was in the frame before, and will be in the next: how far from here, in pixels.
+/// What is not known is not a number.
+struct MotionPlanes {
+    static constexpr int x(bool next) { return next ? 2 : 0; }
+    static constexpr int y(bool next) { return next ? 3 : 1; }
+    static constexpr int kChannels = 4;
+};
+
 /// What prefiltering took off the features that each half shows, r_A and r_B, of each group: sums over its
 /// features.
 struct ResidualPlanes {

@@ -43,6 +43,7 @@ bool isHalved(const Drift& options, int width, int height) {
 Frame::Frame(const SampleSource& dump, const Drift& options, Kept kept, StageClock& clock)
     : dump_(dump),
       options_(options),
+      kept_(kept),
       clock_(clock),
       layout_(layoutOf(dump, options)),
       planes_{layout_.radiance, layout_.features},
@@ -70,6 +71,7 @@ void Frame::own(int first, int end) {
 }
 
 void Frame::startAbove(int fine, int coarse) {
+    if (kept_ == Kept::Whole) return;
     int filled = fine_.startAbove(fine);
     if (coarse_) filled = std::min(filled, 2 * coarse_->startAbove(coarse));
     filledRows_ = filled / 2 * 2;
@@ -132,6 +134,9 @@ void Frame::gather(int until) {
         const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;
         gathered_.claim(first, first + rows);
         parallelFor(0, rows, [&](std::int64_t row) {
+            if (layout_.motion >= 0)
+                gatherMotion(band, layout_, static_cast<int>(row), scale, fine_.motion(),
+                             first + static_cast<int>(row));
             counts[static_cast<std::size_t>(row)] =
                 gatherRow(band, layout_, planes_, static_cast<int>(row), clamp, gathered_,
                           first + static_cast<int>(row));
@@ -177,6 +182,8 @@ void Frame::fill(int until) {
             parallelFor(first / 2, (end + 1) / 2, [&](std::int64_t y) {
                 halveRow(fine_.pixels(), width_, height_, layout_.radiance, layout_.features,
                          static_cast<int>(y), coarse_->pixels());
+                if (layout_.motion >= 0)
+                    halveMotion(fine_.motion(), width_, height_, static_cast<int>(y), coarse_->motion());
             });
         }
         filledRows_ = end;

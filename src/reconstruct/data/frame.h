@@ -46,7 +46,7 @@ class Frame {
     /// Counts rows from `first` up to `end` only.
     void own(int first, int end);
     /// Lets the levels start just far enough above their rows `fine` and `coarse` of variances for these to
-    /// be what they are in the whole picture.
+    /// be what they are in the whole picture. Nothing where all rows are kept.
     void startAbove(int fine, int coarse);
     /// Fills all rows of both levels.
     void fillAll();
@@ -59,6 +59,7 @@ class Frame {
 
     const SampleSource& dump_;
     const Drift& options_;
+    Kept kept_;
     StageClock& clock_;
     SampleLayout layout_;
     GatheredPlanes planes_;

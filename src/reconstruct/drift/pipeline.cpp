@@ -1,10 +1,11 @@
+#include "reconstruct/drift/pipeline.h"
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
 #include "reconstruct/common/methods.h"
 #include "reconstruct/common/stage_clock.h"
-#include "reconstruct/data/frame.h"
 #include "reconstruct/drift/finishing.h"
 #include "reconstruct/drift/half_resolution.h"
 #include "reconstruct/drift/level.h"
@@ -47,20 +48,22 @@ void check(const SampleSource& dump, const Drift& options) {
 /// resolution is corrected by that of half the resolution, and finished.
 class Pipeline {
   public:
-    Pipeline(const SampleSource& dump, const Drift& options, const RowSink& sink, const Progress& progress)
+    Pipeline(const SampleSource& dump, const Drift& options, Frame& frame, const FrameMerge& merge,
+             ReconstructionReport& report, StageClock& clock, const RowSink& sink, const Progress& progress)
         : dump_(dump),
           options_(options),
           sink_(sink),
           progress_(progress),
-          drift_(report_.method.emplace<DriftReport>()),
-          clock_(drift_.seconds),
-          frame_(dump, options, Kept::Rows, clock_),
+          report_(report),
+          drift_(std::get<DriftReport>(report.method)),
+          clock_(clock),
+          frame_(frame),
           layout_(frame_.layout()),
           width_(frame_.width()),
           height_(frame_.height()),
           halved_(frame_.halved()),
           radiance_(layout_.radiance),
-          fine_(layout_, options, false, frame_.fine(), drift_, clock_),
+          fine_(layout_, options, false, frame_.fine(), merge.fine, drift_, clock_),
           differences_(width_, halved_ ? DifferencePlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           clean_(width_, CleanPlanes{radiance_}.channels(), kept(kCleanRows)),
@@ -70,7 +73,7 @@ class Pipeline {
                      clean_, light_, common_) {
         if (halved_) {
             coarse_ =
-                std::make_unique<Level>(layout_, options, true, frame_.coarse(), drift_, clock_);
+                std::make_unique<Level>(layout_, options, true, frame_.coarse(), merge.coarse, drift_, clock_);
             correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
                                                        corrected_);
         }
@@ -91,7 +94,7 @@ class Pipeline {
                                halved_ ? corrected_ : fine_.rows().combined, radiance_);
     }
 
-    ReconstructionReport run() {
+    void run() {
         while (finishedRows_ < endRow_) {
             finish(std::min(endRow_, finishedRows_ + kTile));
             if (progress_) progress_(finishedRows_ - firstRow_, endRow_ - firstRow_);
@@ -113,7 +116,6 @@ class Pipeline {
         }
         for (const auto& [stage, seconds] : drift_.seconds)
             (stage == "read" ? report_.readSeconds : report_.solveSeconds) += seconds;
-        return std::move(report_);
     }
 
   private:
@@ -205,10 +207,10 @@ class Pipeline {
     const Drift& options_;
     const RowSink& sink_;
     const Progress& progress_;
-    ReconstructionReport report_;
+    ReconstructionReport& report_;
     DriftReport& drift_;  // in it
-    StageClock clock_;
-    Frame frame_;
+    StageClock& clock_;
+    Frame& frame_;
     const SampleLayout& layout_;
     int width_, height_;
     bool halved_;  // large enough for a coarse level
@@ -261,9 +263,19 @@ Image driftOutline(const SampleSource& dump, const Drift& options) {
     return image;
 }
 
+void krigeFrame(const SampleSource& dump, const Drift& options, Frame& frame, const FrameMerge& merge,
+                ReconstructionReport& report, StageClock& clock, const RowSink& sink,
+                const Progress& progress) {
+    Pipeline(dump, options, frame, merge, report, clock, sink, progress).run();
+}
+
 ReconstructionReport reconstructDrift(const SampleSource& dump, const Drift& options, const RowSink& sink,
                                       const Progress& progress) {
-    return Pipeline(dump, options, sink, progress).run();
+    ReconstructionReport report;
+    StageClock clock(report.method.emplace<DriftReport>().seconds);
+    Frame frame(dump, options, Kept::Rows, clock);
+    krigeFrame(dump, options, frame, {}, report, clock, sink, progress);
+    return report;
 }
 
 }  // namespace vlx
