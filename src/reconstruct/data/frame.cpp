@@ -1,33 +1,16 @@
 #include "reconstruct/data/frame.h"
 
 #include <algorithm>
-#include <string>
-#include <vector>
 
-#include "reconstruct/common/rebin.h"
 #include "reconstruct/data/prefilter.h"
-#include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
-#include "variolux/geostat/random_drift.h"
 
 namespace vlx {
 
 namespace {
 
-constexpr int kReadRows = 16;
-constexpr int kFilledRows = 32;         // pixels of data filled at a time
-constexpr int kGatheredRows = 64;       // those filled, 11 around them, and those read at a time
+constexpr int kFilledRows = 32;        // pixels of data filled at a time
 constexpr int kDraftFeatureReach = 3;  // of prefilterFeatures()
-
-SampleLayout layoutOf(const SampleSource& dump, const Drift& options) {
-    SampleLayout layout = chooseSampleLayout(dump, options);
-    if (layout.features + 5 > kMaxRandomDrift || layout.radiance > kMaxRandomDrift)
-        throw Error(dump.path(),
-                    "expected at most " + std::to_string(kMaxRandomDrift - 5) + " features and " +
-                        std::to_string(kMaxRandomDrift) + " radiance channels, found " +
-                        std::to_string(layout.features) + " and " + std::to_string(layout.radiance));
-    return layout;
-}
 
 int featureReachOf(const Drift& options) {
     if (!options.steps.prefilter) return 0;
@@ -40,150 +23,49 @@ bool isHalved(const Drift& options, int width, int height) {
 
 }  // namespace
 
-Frame::Frame(const SampleSource& dump, const Drift& options, Kept kept, StageClock& clock)
-    : dump_(dump),
-      options_(options),
-      kept_(kept),
+Frame::Frame(const SampleLayout& layout, const PictureScale& picture, const Drift& options, int width,
+             int height, Kept kept, PixelSource& source, StageClock& clock)
+    : layout_(layout),
+      picture_(picture),
+      source_(source),
       clock_(clock),
-      layout_(layoutOf(dump, options)),
-      planes_{layout_.radiance, layout_.features},
-      width_(dump.header().data.width * options.scale),
-      height_(dump.header().data.height * options.scale),
-      readRows_(kReadRows / options.scale),
-      picture_(measurePictureScale(dump, layout_)),
-      gathered_(width_, planes_.channels(), std::min(kGatheredRows, height_)),
       fine_(
-          layout_, options.steps.unseen, featureReachOf(options), width_, height_, kept,
-          isHalved(options, width_, height_), picture_, [this](int until) { fill(until); }, clock),
-      pixels_(dump, layout_, planes_, picture_, options.scale, width_, height_,
-              options.fireflies == Fireflies::Robust, gathered_, fine_.pixels()),
-      endRow_(height_) {
-    if (!isHalved(options, width_, height_)) return;
+          layout, options.steps.unseen, featureReachOf(options), width, height, kept,
+          isHalved(options, width, height), picture, [this](int until) { fill(until); }, clock) {
+    if (!isHalved(options, width, height)) return;
     coarse_ = std::make_unique<LevelData>(
-        layout_, options.steps.unseen, featureReachOf(options), (width_ + 1) / 2, (height_ + 1) / 2, kept,
-        false, picture_, [this](int until) { fill(2 * until); }, clock);
+        layout, options.steps.unseen, featureReachOf(options), (width + 1) / 2, (height + 1) / 2, Kept::Rows,
+        false, picture, [this](int until) { fill(2 * until); }, clock);
     fine_.lookAt(*coarse_);
 }
 
-void Frame::own(int first, int end) {
-    firstRow_ = first;
-    endRow_ = end;
-}
-
 void Frame::startAbove(int fine, int coarse) {
-    if (kept_ == Kept::Whole) return;
     int filled = fine_.startAbove(fine);
     if (coarse_) filled = std::min(filled, 2 * coarse_->startAbove(coarse));
     filledRows_ = filled / 2 * 2;
-    gatheredRows_ =
-        std::max(0, filledRows_ - PixelData::reach(options_.scale)) / options_.scale * options_.scale;
+    source_.startAbove(filledRows_);
 }
 
 void Frame::fillAll() {
-    for (int y = 0; y < height_; y += kTile) fine_.fill(y + kTile);  // few at a time: rings hold no more
-    if (coarse_) coarse_->fill(coarse_->height());
+    for (int y = 0; y < height(); y += kTile) fine_.fill(y + kTile);  // few at a time: rings hold no more
 }
 
 std::uint64_t Frame::ringBytes() const {
-    return gathered_.bytes() + fine_.ringBytes() + (coarse_ ? coarse_->ringBytes() : 0);
+    return source_.ringBytes() + fine_.ringBytes() + (coarse_ ? coarse_->ringBytes() : 0);
 }
 
-void Frame::readWithin(std::uint64_t most, std::uint64_t held) {
-    const Window& data = dump_.header().data;
-    std::uint64_t samples = 0;
-    bool gaps = false;
-    for (int y = data.y; y < data.y + data.height; ++y) {
-        std::uint64_t ofRow = 0;
-        for (const std::uint32_t n : dump_.counts(y, 1)) {
-            ofRow += n;
-            gaps = gaps || n == 0;
-        }
-        samples = std::max(samples, ofRow);
-    }
-    if (gaps) held += GapField::bytes(dump_, layout_);
-    // The values of a row, twice where they are sorted into parts of pixels; and, on each thread that
-    // unpacks one, all its channels packed and unpacked.
-    const auto width = static_cast<std::uint64_t>(data.width);
-    const std::uint64_t values =
-        (samples * layout_.names.size() * 4 + width * 16) * (options_.scale > 1 ? 2 : 1);
-    const std::uint64_t unpacking = samples * dump_.header().channels.size() * 8 + width * 8;
-    const auto needed = [&](int rows) {
-        return held + static_cast<std::uint64_t>(rows) * values +
-               static_cast<std::uint64_t>(std::min(rows, threadCount())) * unpacking;
-    };
-    readRows_ = kReadRows / options_.scale;
-    while (readRows_ > 1 && needed(readRows_) > most) --readRows_;
-    if (needed(readRows_) > most)
-        throw Error(dump_.path(), "expected a memory limit of at least " +
-                                      std::to_string((needed(readRows_) + 999'999) / 1'000'000) +
-                                      "M for rows as wide and full as these, found " +
-                                      std::to_string(most / 1'000'000) + "M");
-}
-
-// Each stage fills rows up to (not including) `until`, cut to the image, after the stages that it needs.
-
-void Frame::gather(int until) {
-    until = std::min(until, height_);
-    while (gatheredRows_ < until) {
-        const int scale = options_.scale, first = gatheredRows_;
-        const int sourceRows = std::min(readRows_, (height_ - first) / scale);
-        const int rows = sourceRows * scale;
-        const SampleBand band = readRows(dump_, layout_, scale, first / scale, sourceRows);
-        clock_.addTo("read");
-        std::vector<GatherCounts> counts(static_cast<std::size_t>(rows));
-        const double clamp = options_.fireflies == Fireflies::Clamp ? options_.clamp : 0;
-        gathered_.claim(first, first + rows);
-        parallelFor(0, rows, [&](std::int64_t row) {
-            if (layout_.motion >= 0)
-                gatherMotion(band, layout_, static_cast<int>(row), scale, fine_.motion(),
-                             first + static_cast<int>(row));
-            counts[static_cast<std::size_t>(row)] =
-                gatherRow(band, layout_, planes_, static_cast<int>(row), clamp, gathered_,
-                          first + static_cast<int>(row));
-        });
-        for (int row = 0; row < rows; ++row) {
-            if (!isOwn(first + row)) continue;
-            const GatherCounts& of = counts[static_cast<std::size_t>(row)];
-            counts_.samples += of.samples;
-            counts_.dropped += of.dropped;
-            counts_.empty += of.empty;
-            counts_.limited += of.limited;
-            counts_.luminance += of.luminance;
-            counts_.removed += of.removed;
-            counts_.light += of.light;
-            counts_.noise += of.noise;
-        }
-        gatheredRows_ += rows;
-        clock_.addTo("statistics");
-    }
-}
-
-/// Data of both levels.
+/// Data of both levels up to (not including) `until`, cut to the picture.
 void Frame::fill(int until) {
-    until = std::min(until, height_);
+    until = std::min(until, height());
     while (filledRows_ < until) {
-        const int first = filledRows_, end = std::min(height_, first + kFilledRows);
-        gather(end + PixelData::reach(options_.scale));
-        pixels_.prepare(first, end);
+        const int first = filledRows_, end = std::min(height(), first + kFilledRows);
         fine_.pixels().claim(first, end);
-        std::vector<LimitedRow> limited(static_cast<std::size_t>(end - first));
-        parallelFor(first, end, [&](std::int64_t y) {
-            limited[static_cast<std::size_t>(y - first)] = pixels_.fillRow(static_cast<int>(y));
-        });
-        for (int y = first; y < end; ++y) {
-            if (!isOwn(y)) continue;
-            const LimitedRow& of = limited[static_cast<std::size_t>(y - first)];
-            counts_.limited += of.samples;
-            counts_.farPixels += of.farPixels;
-            counts_.removed += of.luminance;
-        }
+        source_.fill(first, end, fine_.pixels());
         if (coarse_) {
             coarse_->pixels().claim(first / 2, (end + 1) / 2);
             parallelFor(first / 2, (end + 1) / 2, [&](std::int64_t y) {
-                halveRow(fine_.pixels(), width_, height_, layout_.radiance, layout_.features,
+                halveRow(fine_.pixels(), width(), height(), layout_.radiance, layout_.features,
                          static_cast<int>(y), coarse_->pixels());
-                if (layout_.motion >= 0)
-                    halveMotion(fine_.motion(), width_, height_, static_cast<int>(y), coarse_->motion());
             });
         }
         filledRows_ = end;

@@ -2,12 +2,11 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 
 #include "reconstruct/data/level_data.h"
 #include "variolux/reconstruct/drift.h"
 
-/// What the samples of one dump say, pixel by pixel, at its resolution and at half of it: drift.h, 1 and 2.
+/// What is known of a frame's pixels, at its resolution and at half of it: drift.h, 1 and 2.
 namespace vlx {
 
 /// What was found in the rows that are the reconstruction's own.
@@ -19,59 +18,55 @@ struct FrameCounts {
     double light = 0, noise = 0;  ///< GatherCounts
 };
 
-/// Samples are gathered to pixels, these limited to data, at both resolutions, features prefiltered and
-/// variances pooled; all as far as it is asked for.
+/// Where a frame's data come from.
+class PixelSource {
+  public:
+    virtual ~PixelSource() = default;
+    /// Rows from `first` on are asked for.
+    virtual void startAbove(int first) = 0;
+    /// Fills the rows [first, end) of the fine level's pixels; the next call goes on there.
+    virtual void fill(int first, int end, PixelRows& out) = 0;
+    virtual const FrameCounts& counts() const = 0;
+    virtual std::uint64_t ringBytes() const = 0;
+};
+
+/// Two levels, of which the coarse one's data are the fine one's, 2 x 2 pixels as one; filled as far as they
+/// are asked for.
 class Frame {
   public:
-    /// Throws Error as chooseSampleLayout(), and where the dump has more features or radiance channels than
-    /// kriging takes. The dump and the options must live as long.
-    Frame(const SampleSource& dump, const Drift& options, Kept kept, StageClock& clock);
+    /// All that it is given must live as long.
+    Frame(const SampleLayout& layout, const PictureScale& picture, const Drift& options, int width, int height,
+          Kept kept, PixelSource& source, StageClock& clock);
     Frame(const Frame&) = delete;
     Frame& operator=(const Frame&) = delete;
 
     const SampleLayout& layout() const { return layout_; }
     const PictureScale& picture() const { return picture_; }
-    int width() const { return width_; }
-    int height() const { return height_; }
+    int width() const { return fine_.width(); }
+    int height() const { return fine_.height(); }
     bool halved() const { return coarse_ != nullptr; }  ///< large enough for a coarse level
     LevelData& fine() { return fine_; }
     LevelData& coarse() { return *coarse_; }
     const LevelData& fine() const { return fine_; }
-    const LevelData& coarse() const { return *coarse_; }
-    const FrameCounts& counts() const { return counts_; }
+    const FrameCounts& counts() const { return source_.counts(); }
 
-    /// Chooses how many rows are read at a time so that the process, which holds `held` bytes besides what is
-    /// read, takes no more than `most`. Throws Error when it takes more with one.
-    void readWithin(std::uint64_t most, std::uint64_t held);
-    /// Counts rows from `first` up to `end` only.
-    void own(int first, int end);
     /// Lets the levels start just far enough above their rows `fine` and `coarse` of variances for these to
-    /// be what they are in the whole picture. Nothing where all rows are kept.
+    /// be what they are in the whole picture.
     void startAbove(int fine, int coarse);
-    /// Fills all rows of both levels.
+    /// Fills all rows of the fine level.
     void fillAll();
     std::uint64_t ringBytes() const;
 
   private:
-    bool isOwn(int y) const { return y >= firstRow_ && y < endRow_; }
-    void gather(int until);
     void fill(int until);
 
-    const SampleSource& dump_;
-    const Drift& options_;
-    Kept kept_;
+    const SampleLayout& layout_;
+    const PictureScale& picture_;
+    PixelSource& source_;
     StageClock& clock_;
-    SampleLayout layout_;
-    GatheredPlanes planes_;
-    int width_, height_, readRows_;
-    PictureScale picture_;
-    RowRing gathered_;
     LevelData fine_;
     std::unique_ptr<LevelData> coarse_;
-    PixelData pixels_;
-    FrameCounts counts_;
-    int firstRow_ = 0, endRow_;  // own rows
-    int gatheredRows_ = 0, filledRows_ = 0;
+    int filledRows_ = 0;
 };
 
 }  // namespace vlx

@@ -40,10 +40,9 @@ LevelData::LevelData(const SampleLayout& layout, bool unseen, int featureReach, 
       source_(std::move(source)),
       clock_(clock),
       pixels_{RowRing(width, DataPlanes{radiance_}.channels(), keptOf(kept, rowsOf(driven).data, height)),
-              RowRing(width, SquaresPlanes::kChannels, std::min(rowsOf(driven).squares, height)),
+              RowRing(width, SquaresPlanes::kChannels, keptOf(kept, rowsOf(driven).squares, height)),
               RowRing(width, FeaturePlanes{layout.features}.rawChannels(),
-                      std::min(rowsOf(driven).raw, height))},
-      motion_(width, layout.motion < 0 ? 0 : MotionPlanes::kChannels, height),
+                      keptOf(kept, rowsOf(driven).raw, height))},
       features_(width, FeaturePlanes{layout.features}.channels(), keptOf(kept, kFeatureRows, height)),
       residuals_(width, ResidualPlanes{layout.groups}.channels(), std::min(kResidualRows, height)),
       variances_(width, VariancePlanes::kChannels, keptOf(kept, kVarianceRows, height)) {}
@@ -58,7 +57,7 @@ int LevelData::startAbove(int first) {
 std::uint64_t LevelData::ringBytes() const {
     std::uint64_t bytes = 0;
     for (const RowRing* ring :
-         {&pixels_.data, &pixels_.squares, &pixels_.raw, &motion_, &features_, &residuals_, &variances_})
+         {&pixels_.data, &pixels_.squares, &pixels_.raw, &features_, &residuals_, &variances_})
         bytes += ring->bytes();
     return bytes;
 }

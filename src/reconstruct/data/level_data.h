@@ -45,8 +45,7 @@ class LevelData {
     PixelRows& pixels() { return pixels_; }  ///< for the source to fill
     int width() const { return width_; }
     int height() const { return height_; }
-    RowRing& motion() { return motion_; }  ///< likewise; no planes where it is not known
-    const RowRing& motion() const { return motion_; }
+    const PixelRows& pixels() const { return pixels_; }
     const RowRing& data() const { return pixels_.data; }     ///< DataPlanes
     const RowRing& features() const { return features_; }    ///< FeaturePlanes
     const RowRing& variances() const { return variances_; }  ///< VariancePlanes
@@ -61,7 +60,7 @@ class LevelData {
     Source source_;
     StageClock& clock_;
     PixelRows pixels_;
-    RowRing motion_, features_, residuals_, variances_;
+    RowRing features_, residuals_, variances_;
     LevelData* wider_ = nullptr;
     int prefilteredRows_ = 0, featureRows_ = 0, varianceRows_ = 0;
 };

@@ -292,18 +292,4 @@ void halveRow(const PixelRows& fine, int width, int height, int radiance, int fe
     }
 }
 
-void halveMotion(const RowRing& fine, int width, int height, int y, RowRing& coarse) {
-    for (int k = 0; k < MotionPlanes::kChannels; ++k)
-        for (int x = 0; 2 * x < width; ++x) {
-            float sum = 0, count = 0;
-            forParts(width, height, x, y, [&](int col, int row) {
-                const float value = fine.row(k, row)[col];
-                if (std::isnan(value)) return;
-                sum += value;
-                ++count;
-            });
-            coarse.row(k, y)[x] = count > 0 ? sum / count / 2 : std::numeric_limits<float>::quiet_NaN();
-        }
-}
-
 }  // namespace vlx

@@ -107,7 +107,4 @@ inline constexpr int kLeastHalved = 32;
 void halveRow(const PixelRows& fine, int width, int height, int radiance, int features, int y,
               PixelRows& coarse);
 
-/// Motion of each 2 x 2 pixels as one: the mean of what is known, in pixels twice as large.
-void halveMotion(const RowRing& fine, int width, int height, int y, RowRing& coarse);
-
 }  // namespace vlx

@@ -86,7 +86,6 @@ void Centre::krige(const TilePlanes& tile, int at, const Surroundings& around, c
     counts.features += static_cast<std::int64_t>(varying_.size());
     counts.failed += !drift.ok;
     counts.effective += drift.effective;
-    if (tile_.targets) takeTargets();
     predict(drift, sums);
 }
 
@@ -208,24 +207,6 @@ RandomDrift Centre::fit() {
             moments.right(a, c) = centred(used_[i], 1 + functions_ + c) * unit_[i] / variance_;
     }
     return fitRandomDrift(moments, group_, tile_.groups + 2, kPriorIterations);
-}
-
-/// From the data's features to those of the pixels that are predicted, no farther than the data reach.
-void Centre::takeTargets() {
-    for (std::size_t i = 0; i < varying_.size(); ++i) {
-        const int f = varying_[i];
-        float* const x = row(1 + kPositionFunctions + static_cast<int>(i));
-        float least = std::numeric_limits<float>::infinity(), most = -least;
-        for (int k = 0; k < count_; ++k) {
-            if (weights_[static_cast<std::size_t>(k)] <= 0) continue;
-            least = std::min(least, x[k]);
-            most = std::max(most, x[k]);
-        }
-        list(tile_.targets + TilePlanes::plane(f), tile_.features[TilePlanes::plane(f) + centre_], x);
-        for (int k = 0; k < count_; ++k) x[k] = std::clamp(x[k], least, most);
-        list(tile_.targets + TilePlanes::plane(FeaturePlanes{tile_.featureCount}.error(f)), 0,
-             errors_.data() + static_cast<int>(i) * stride_);
-    }
 }
 
 /// No function is followed beyond the data: pixels without any take its nearest value among them. Few data

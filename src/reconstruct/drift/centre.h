@@ -28,7 +28,6 @@ struct TilePlanes {
     const float* errors = nullptr;      ///< error variance of a mean, averaged over R, G, B
     const float* references = nullptr;  ///< radiance channels: what estimates are summed about
     const float* features = nullptr;    ///< FeaturePlanes
-    const float* targets = nullptr;     ///< likewise, of what is predicted; null: the same
     int radiance = 3, featureCount = 0;
     const std::vector<int>* group = nullptr;  ///< of each feature
     int groups = 0;
@@ -60,7 +59,6 @@ class Centre {
     void stackFunctions();
     void stackRadiance();
     RandomDrift fit();
-    void takeTargets();
     void limitFunctions();
     void predict(const RandomDrift& drift, float* sums);
     void sumFeatureErrors(const RandomDrift& drift, float* out) const;

@@ -53,7 +53,6 @@ Finishing::Finishing(const SampleLayout& layout, const Drift& options, const Pic
       radiance_(layout.radiance),
       picture_(picture),
       data_(level.data),
-      kriged_(level.kriged),
       features_(level.features),
       variances_(level.variances),
       combined_(combined),
@@ -98,7 +97,7 @@ void Finishing::cleanRow(int y) {
         }
         if (excess == 0) continue;
         const double leverage = combined_.row(combinedPlanes_.leverage(), y)[x];
-        const double n = std::max(1.f, kriged_.row(planes_.count(), y)[x]);
+        const double n = std::max(1.f, data_.row(planes_.count(), y)[x]);
         for (int c = 0; c < 3; ++c) variance += sampleVariance(c, x, y) / n;
         const double kept = shrinkage(excess, leverage * leverage * variance);
         if (kept >= 1) continue;
@@ -131,10 +130,10 @@ void Finishing::errorRow(int y) {
     const std::vector<float> sums = sharedVariances(y);
     std::vector<float> unexplained(static_cast<std::size_t>(width_)), known(unexplained.size());
     for (int x = 0; x < width_; ++x) {
-        const double n = kriged_.row(planes_.count(), y)[x];
+        const double n = data_.row(planes_.count(), y)[x];
         const double leverage = combined_.row(combinedPlanes_.leverage(), y)[x];
         const bool twoHalves =
-            kriged_.row(planes_.halfCount(0), y)[x] > 0 && kriged_.row(planes_.halfCount(1), y)[x] > 0;
+            data_.row(planes_.halfCount(0), y)[x] > 0 && data_.row(planes_.halfCount(1), y)[x] > 0;
         const bool exact = isExact(x, y);
         double shared[3], inCommon[3];
         for (std::size_t c = 0; c < 3; ++c)
@@ -149,8 +148,8 @@ void Finishing::errorRow(int y) {
             // A pixel's own scatter beyond two standard deviations raises its variance, by as much as the
             // pixel itself is in its estimate.
             if (twoHalves) {
-                const double apart = static_cast<double>(kriged_.row(planes_.mean(0) + c, y)[x]) -
-                                     static_cast<double>(kriged_.row(planes_.mean(1) + c, y)[x]);
+                const double apart = static_cast<double>(data_.row(planes_.mean(0) + c, y)[x]) -
+                                     static_cast<double>(data_.row(planes_.mean(1) + c, y)[x]);
                 variance +=
                     leverage * leverage * std::max(0.0, apart * apart / 4 - 4 * meanVariance(c, x, y));
             }
@@ -162,7 +161,7 @@ void Finishing::errorRow(int y) {
             row.value[c][i] = value;
             row.deviation[c][i] = static_cast<float>(std::sqrt(variance));
             row.lost[c][i] = lost;
-            row.missing[c][i] = static_cast<float>(plainMean(kriged_, planes_, c, x, y)) + lost - value;
+            row.missing[c][i] = static_cast<float>(plainMean(data_, planes_, c, x, y)) + lost - value;
         }
         if (!twoHalves || exact) continue;
         if (const std::optional<double> more = commonError(x, y, inCommon)) {
@@ -181,7 +180,7 @@ std::optional<double> Finishing::commonError(int x, int y, const double* predict
     double sum = 0;
     for (int c = 0; c < 3; ++c) {
         const auto residual = [&](int half) {
-            return static_cast<double>(kriged_.row(planes_.mean(half) + c, y)[x]) -
+            return static_cast<double>(data_.row(planes_.mean(half) + c, y)[x]) -
                    static_cast<double>(combined_.row(combinedPlanes_.half(half) + c, y)[x]);
         };
         const double variance = meanVariance(c, x, y);
@@ -197,7 +196,7 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
     Counts counts;
     for (int x = 0; x < width_; ++x, out += radiance_ + 3) {
         const auto i = static_cast<std::size_t>(x);
-        const double n = kriged_.row(planes_.count(), y)[x];
+        const double n = data_.row(planes_.count(), y)[x];
         const bool exact = isExact(x, y);
         counts.exact += exact;
         const double strength = n > 0 ? options_.strength : 1;
@@ -216,7 +215,7 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
         }
         double image[3] = {};
         for (int c = 0; c < radiance_; ++c) {
-            const double mean = plainMean(kriged_, planes_, c, x, y);
+            const double mean = plainMean(data_, planes_, c, x, y);
             double value = clean_.row(c, y)[x];
             // Light is not negative. Parts of light must add up: they are left as they come.
             if (c == layout_.alpha) {
@@ -256,7 +255,7 @@ double Finishing::gapVariance(int c, int x, int y) const {
 }
 
 double Finishing::meanVariance(int c, int x, int y) const {
-    return static_cast<double>(variances_.row(c, y)[x]) / std::max(1.f, kriged_.row(planes_.count(), y)[x]);
+    return static_cast<double>(variances_.row(c, y)[x]) / std::max(1.f, data_.row(planes_.count(), y)[x]);
 }
 
 /// Whether the dump states that the pixel, and every one that its error variance was pooled over, has none.

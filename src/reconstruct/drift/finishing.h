@@ -57,7 +57,7 @@ class Finishing {
     int width_, height_, radiance_;
     std::vector<int> colour_;  // of each radiance channel: 0 to 2, or -1: none of these
     const PictureScale& picture_;
-    const RowRing &data_, &kriged_, &features_, &variances_, &combined_;
+    const RowRing &data_, &features_, &variances_, &combined_;
     RowRing& clean_;
     Light light_;
     CommonError common_;

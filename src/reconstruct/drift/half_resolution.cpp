@@ -39,7 +39,7 @@ void Correction::differenceRow(int y) {
     }
     const DataPlanes data{planes_.radiance};
     for (int x = 0; x < fine_.width; ++x) {
-        const double n = std::max(1.f, fine_.kriged.row(data.count(), y)[x]);
+        const double n = std::max(1.f, fine_.data.row(data.count(), y)[x]);
         double variance = 0, top = 0, gain = 0, square = 0;
         for (int c = 0; c < 3; ++c) {
             variance += 2 * static_cast<double>(fine_.variances.row(c, y)[x]) / n / 3;
@@ -47,8 +47,8 @@ void Correction::differenceRow(int y) {
                 const double k = fine_.combined.row(planes_.half(half) + c, y)[x];
                 const double d = differences_.row(apart_.half(half) + c, y)[x];
                 top = std::max({top, k * k, (k + d) * (k + d)});
-                if (fine_.kriged.row(data.halfCount(1 - half), y)[x] == 0) continue;
-                gain += d * (static_cast<double>(fine_.kriged.row(data.mean(1 - half) + c, y)[x]) - k);
+                if (fine_.data.row(data.halfCount(1 - half), y)[x] == 0) continue;
+                gain += d * (static_cast<double>(fine_.data.row(data.mean(1 - half) + c, y)[x]) - k);
                 square += d * d;
             }
         }

@@ -29,13 +29,12 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality, bool coarse) {
     return {{8, 0.8f, 4, true}, {15, 3.f, 8, false, false}, {4, 1.f, 3, false}};
 }
 
-Level::Level(const SampleLayout& layout, const Drift& options, bool coarse, LevelData& data, Merge* merge,
+Level::Level(const SampleLayout& layout, const Drift& options, bool coarse, LevelData& data,
              DriftReport& report, StageClock& clock)
     : layout_(layout),
       steps_(options.steps),
       models_(modelsOf(options.quality, coarse)),
       data_(data),
-      merge_(merge),
       width_(data.width()),
       height_(data.height()),
       radiance_(layout.radiance),
@@ -43,7 +42,7 @@ Level::Level(const SampleLayout& layout, const Drift& options, bool coarse, Leve
       clock_(clock),
       moments_(width_, MomentPlanes{static_cast<int>(models_.size())}.channels(), kept(kEstimateRows)),
       combined_(width_, CombinedPlanes{radiance_}.channels(), kept(kCombinedRows)),
-      combination_(radiance_, width_, height_, kriged(), data.variances(), estimates_, moments_,
+      combination_(radiance_, width_, height_, data.data(), data.variances(), estimates_, moments_,
                    combined_) {
     for (std::size_t m = 0; m < models_.size(); ++m) {
         sums_.emplace_back(width_, EstimatePlanes{radiance_}.channels(), kept(kSumRows));
@@ -56,13 +55,11 @@ int Level::startAbove(int first) {
     finishedRows_ = std::max(0, first - kStackReach);
     krigedRows_ = std::max(0, finishedRows_ - kMaxReach) / kTile * kTile;
     zeroedRows_ = std::max(0, krigedRows_ - kMaxReach);
-    const int needed = std::max(0, krigedRows_ - kTileMargin);
-    if (merge_) merge_->startAbove(needed);
-    return needed;
+    return std::max(0, krigedRows_ - kTileMargin);
 }
 
 std::uint64_t Level::ringBytes() const {
-    std::uint64_t bytes = moments_.bytes() + combined_.bytes() + (merge_ ? merge_->ringBytes() : 0);
+    std::uint64_t bytes = moments_.bytes() + combined_.bytes();
     for (const auto* list : {&sums_, &estimates_})
         for (const RowRing& ring : *list) bytes += ring.bytes();
     return bytes;
@@ -76,9 +73,8 @@ void Level::krige(int until) {
     while (krigedRows_ < until) {
         const int y = krigedRows_;
         data_.fill(y + kTile + kTileMargin);
-        if (merge_) merge_->fill(y + kTile + kTileMargin);
         static std::atomic<std::int64_t> rowsKriged = 0;  // of all levels: no two inputs have one number
-        TileInput input{&kriged(), merge_ ? &merge_->rows().features : &data_.features(), merge_ && !getenv("VLX_NODUAL") ? &data_.features() : nullptr, &data_.variances(), {radiance_}, layout_.features,
+        TileInput input{&data_.data(), &data_.features(), &data_.variances(), {radiance_}, layout_.features,
                         layout_.group, layout_.groups,    width_,             height_,     ++rowsKriged};
         // Rows that this tile row is the first to reach.
         for (RowRing& ring : sums_)
@@ -148,7 +144,7 @@ void Level::finishRow(std::size_t m, int y) {
                     continue;
                 }
                 const double shift = sums_[m].row(from + planes.sum(c), y)[x] / weight;
-                estimate = static_cast<float>(reference(kriged(), data, c, x, y) + shift);
+                estimate = static_cast<float>(reference(data_.data(), data, c, x, y) + shift);
                 if (c >= 3) continue;
                 const double spread =
                     std::max(0.0, sums_[m].row(from + planes.square(c), y)[x] / weight - shift * shift);

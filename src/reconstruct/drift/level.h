@@ -8,7 +8,6 @@
 #include "reconstruct/drift/combination.h"
 #include "reconstruct/drift/neighbourhoods.h"
 #include "reconstruct/data/level_data.h"
-#include "reconstruct/sequence/merge.h"
 #include "variolux/reconstruct/reconstruction.h"
 
 /// The picture at one resolution, from its data to the combination of its models: drift.h, 3 to 5.
@@ -18,7 +17,6 @@ namespace vlx {
 struct LevelRows {
     int width, height;
     const RowRing& data;       ///< DataPlanes
-    const RowRing& kriged;     ///< likewise, with what other frames add
     const RowRing& features;   ///< FeaturePlanes
     const RowRing& variances;  ///< VariancePlanes
     const RowRing& combined;   ///< CombinedPlanes
@@ -30,8 +28,8 @@ std::vector<NeighbourhoodModel> modelsOf(Quality quality, bool coarse);
 /// Stages, each a ring of rows that is filled just ahead of what the next one needs.
 class Level {
   public:
-    /// Kriges `data` by the models that the options ask for, with what `merge` (null: nothing) adds to them.
-    Level(const SampleLayout& layout, const Drift& options, bool coarse, LevelData& data, Merge* merge, DriftReport& report,
+    /// Kriges `data` by the models that the options ask for.
+    Level(const SampleLayout& layout, const Drift& options, bool coarse, LevelData& data, DriftReport& report,
           StageClock& clock);
     Level(const Level&) = delete;
     Level& operator=(const Level&) = delete;
@@ -45,12 +43,11 @@ class Level {
     /// Of all rows that are kept; none is taken yet when the level is made.
     std::uint64_t ringBytes() const;
     LevelRows rows() const {
-        return {width_, height_, data_.data(), kriged(), data_.features(), data_.variances(), combined_};
+        return {width_, height_, data_.data(), data_.features(), data_.variances(), combined_};
     }
 
   private:
     int kept(int rows) const { return std::min(rows, height_); }
-    const RowRing& kriged() const { return merge_ ? merge_->rows().data : data_.data(); }
     void krige(int until);
     void finish();
     void finishRow(std::size_t m, int y);
@@ -60,7 +57,6 @@ class Level {
     DriftSteps steps_;
     std::vector<NeighbourhoodModel> models_;
     LevelData& data_;
-    Merge* merge_;
     int width_, height_, radiance_;
     DriftReport& report_;
     StageClock& clock_;

@@ -86,10 +86,6 @@ class Tile {
         features_.resize(plane(2 * input.featureCount) + kPast);
         for (int f = 0; f < 2 * input.featureCount; ++f)
             copy(*input.features, f, features_.data() + plane(f));
-        if (!input.targets) return;
-        targets_.resize(features_.size());
-        for (int f = 0; f < 2 * input.featureCount; ++f)
-            copy(*input.targets, f, targets_.data() + plane(f));
     }
 
     /// All neighbourhoods of one half, of all models.
@@ -187,7 +183,7 @@ class Tile {
     /// What the pixels around are like the one at (col, row); beyond the picture they are not.
     void rate(int col, int row, const Surroundings& around, const float* distances) {
         alike_.resize(static_cast<std::size_t>(around.size()));
-        rateSurroundings({distances, 1 / (model_.tolerance * model_.tolerance), (in_.targets ? targets_ : features_).data(),
+        rateSurroundings({distances, 1 / (model_.tolerance * model_.tolerance), features_.data(),
                           model_.features ? in_.featureCount : 0, plane(1)},
                          inner(col, row), around, alike_.data());
         const int left = std::max(-around.reach, -(x_ + col)),
@@ -220,7 +216,6 @@ class Tile {
         planes.errors = errors_[half_].data();
         planes.references = references_.data();
         planes.features = features_.data();
-        planes.targets = in_.targets ? targets_.data() : nullptr;
         planes.radiance = in_.planes.radiance;
         planes.featureCount = in_.featureCount;
         planes.group = &in_.group;
@@ -243,7 +238,7 @@ class Tile {
     int x_ = 0, y_ = 0, half_ = 0;
     NeighbourhoodModel model_;
     PatchTile guides_[2];
-    std::vector<float> means_[2], counts_[2], errors_[2], references_, features_, targets_, scratch_;
+    std::vector<float> means_[2], counts_[2], errors_[2], references_, features_, scratch_;
 
     std::vector<PatchLattice> lattices_;    // of regular centres, for each model
     std::vector<float> distances_, alike_;  // of one centre

@@ -24,7 +24,6 @@ struct NeighbourhoodModel {
 struct TileInput {
     const RowRing* data = nullptr;       ///< DataPlanes
     const RowRing* features = nullptr;   ///< FeaturePlanes
-    const RowRing* targets = nullptr;    ///< FeaturePlanes of what is predicted, where the data have others
     const RowRing* variances = nullptr;  ///< VariancePlanes
     DataPlanes planes;
     int featureCount = 0;

@@ -6,6 +6,7 @@
 
 #include "reconstruct/common/methods.h"
 #include "reconstruct/common/stage_clock.h"
+#include "reconstruct/data/sampled_frame.h"
 #include "reconstruct/drift/finishing.h"
 #include "reconstruct/drift/half_resolution.h"
 #include "reconstruct/drift/level.h"
@@ -43,17 +44,16 @@ void check(const SampleSource& dump, const Drift& options) {
     }
 }
 
+}  // namespace
+
 /// The stages of the reconstruction, each a ring of rows that is filled just ahead of what the next one
 /// needs: samples are gathered to pixels, these limited to data, which two levels krige; the picture of full
 /// resolution is corrected by that of half the resolution, and finished.
-class Pipeline {
+class FrameKriging::Stages {
   public:
-    Pipeline(const SampleSource& dump, const Drift& options, Frame& frame, const FrameMerge& merge,
-             ReconstructionReport& report, StageClock& clock, const RowSink& sink, const Progress& progress)
-        : dump_(dump),
-          options_(options),
-          sink_(sink),
-          progress_(progress),
+    Stages(const SampleSource& dump, const Drift& options, Frame& frame, ReconstructionReport& report,
+           StageClock& clock)
+        : options_(options),
           report_(report),
           drift_(std::get<DriftReport>(report.method)),
           clock_(clock),
@@ -63,7 +63,7 @@ class Pipeline {
           height_(frame_.height()),
           halved_(frame_.halved()),
           radiance_(layout_.radiance),
-          fine_(layout_, options, false, frame_.fine(), merge.fine, drift_, clock_),
+          fine_(layout_, options, false, frame_.fine(), drift_, clock_),
           differences_(width_, halved_ ? DifferencePlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           corrected_(width_, halved_ ? CombinedPlanes{radiance_}.channels() : 0, kept(kCorrectedRows)),
           clean_(width_, CleanPlanes{radiance_}.channels(), kept(kCleanRows)),
@@ -73,19 +73,13 @@ class Pipeline {
                      clean_, light_, common_) {
         if (halved_) {
             coarse_ =
-                std::make_unique<Level>(layout_, options, true, frame_.coarse(), merge.coarse, drift_, clock_);
+                std::make_unique<Level>(layout_, options, true, frame_.coarse(), drift_, clock_);
             correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
                                                        corrected_);
         }
-        requireMemory(dump.path(), ringBytes(), "rows as wide as these");
-        if (options.maxMemory > 0)
-            frame_.readWithin(options.maxMemory,
-                              kProcessBytes + ringBytes() +
-                                  kThreadBytes * static_cast<std::uint64_t>(threadCount()));
         const Window window = driftOutline(dump, options).data;
         firstRow_ = window.y - scaled(dump.header().data, options.scale).y;
         endRow_ = firstRow_ + window.height;
-        frame_.own(firstRow_, endRow_);
         rows_ = Image({0, 0, width_, kept(kTile)},
                       std::vector<std::string>(static_cast<std::size_t>(radiance_ + 3)));
         startAbove(firstRow_);
@@ -94,10 +88,10 @@ class Pipeline {
                                halved_ ? corrected_ : fine_.rows().combined, radiance_);
     }
 
-    void run() {
+    void run(const RowSink& sink, const Progress& progress) {
         while (finishedRows_ < endRow_) {
-            finish(std::min(endRow_, finishedRows_ + kTile));
-            if (progress_) progress_(finishedRows_ - firstRow_, endRow_ - firstRow_);
+            finish(std::min(endRow_, finishedRows_ + kTile), sink);
+            if (progress) progress(finishedRows_ - firstRow_, endRow_ - firstRow_);
         }
         const FrameCounts& counts = frame_.counts();
         report_.samples = counts.samples;
@@ -118,6 +112,15 @@ class Pipeline {
             (stage == "read" ? report_.readSeconds : report_.solveSeconds) += seconds;
     }
 
+    /// Of all rows that are kept; none is taken yet when the pipeline is made.
+    std::uint64_t ringBytes() const {
+        std::uint64_t bytes = static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(kept(kTile)) *
+                              static_cast<std::uint64_t>(radiance_ + 3) * sizeof(float);
+        for (const RowRing* ring : {&differences_, &corrected_, &clean_, &light_, &common_})
+            bytes += ring->bytes();
+        return bytes + frame_.ringBytes() + fine_.ringBytes() + (coarse_ ? coarse_->ringBytes() : 0);
+    }
+
   private:
     /// Lets each stage start just far enough above row `first` for that row to be what it is in the whole
     /// image.
@@ -136,15 +139,6 @@ class Pipeline {
 
     /// How many of `rows` rows a ring of the whole image has use for.
     int kept(int rows) const { return std::min(rows, height_); }
-
-    /// Of all rows that are kept; none is taken yet when the pipeline is made.
-    std::uint64_t ringBytes() const {
-        std::uint64_t bytes = static_cast<std::uint64_t>(width_) * static_cast<std::uint64_t>(kept(kTile)) *
-                              static_cast<std::uint64_t>(radiance_ + 3) * sizeof(float);
-        for (const RowRing* ring : {&differences_, &corrected_, &clean_, &light_, &common_})
-            bytes += ring->bytes();
-        return bytes + frame_.ringBytes() + fine_.ringBytes() + (coarse_ ? coarse_->ringBytes() : 0);
-    }
 
     // Each stage fills rows up to (not including) `until`, cut to the image, after the stages that it needs.
 
@@ -181,7 +175,7 @@ class Pipeline {
         }
     }
 
-    void finish(int until) {
+    void finish(int until, const RowSink& sink) {
         until = std::min(until, height_);
         clean(until + LightReach::kNear);
         std::vector<Finishing::Counts> counts(static_cast<std::size_t>(until - finishedRows_));
@@ -198,15 +192,12 @@ class Pipeline {
         }
         for (int y = finishedRows_; y < until && residuals_; ++y) residuals_->addRow(y, drift_);
         clock_.addTo("finishing");
-        sink_(rows_.pixels.data(), until - finishedRows_);
+        sink(rows_.pixels.data(), until - finishedRows_);
         finishedRows_ = until;
         clock_.addTo("output");
     }
 
-    const SampleSource& dump_;
     const Drift& options_;
-    const RowSink& sink_;
-    const Progress& progress_;
     ReconstructionReport& report_;
     DriftReport& drift_;  // in it
     StageClock& clock_;
@@ -228,7 +219,15 @@ class Pipeline {
     Image rows_;                                 // finished, on their way out
 };
 
-}  // namespace
+FrameKriging::FrameKriging(const SampleSource& dump, const Drift& options, Frame& frame,
+                           ReconstructionReport& report, StageClock& clock)
+    : stages_(std::make_unique<Stages>(dump, options, frame, report, clock)) {}
+
+FrameKriging::~FrameKriging() = default;
+
+std::uint64_t FrameKriging::ringBytes() const { return stages_->ringBytes(); }
+
+void FrameKriging::run(const RowSink& sink, const Progress& progress) { stages_->run(sink, progress); }
 
 std::optional<std::string> Drift::validate() const {
     if (!(strength >= 0 && strength <= 1))
@@ -263,18 +262,20 @@ Image driftOutline(const SampleSource& dump, const Drift& options) {
     return image;
 }
 
-void krigeFrame(const SampleSource& dump, const Drift& options, Frame& frame, const FrameMerge& merge,
-                ReconstructionReport& report, StageClock& clock, const RowSink& sink,
-                const Progress& progress) {
-    Pipeline(dump, options, frame, merge, report, clock, sink, progress).run();
-}
-
 ReconstructionReport reconstructDrift(const SampleSource& dump, const Drift& options, const RowSink& sink,
                                       const Progress& progress) {
     ReconstructionReport report;
     StageClock clock(report.method.emplace<DriftReport>().seconds);
-    Frame frame(dump, options, Kept::Rows, clock);
-    krigeFrame(dump, options, frame, {}, report, clock, sink, progress);
+    SampledFrame samples(dump, options, Kept::Rows, clock);
+    FrameKriging kriging(dump, options, samples.frame(), report, clock);
+    requireMemory(dump.path(), kriging.ringBytes(), "rows as wide as these");
+    if (options.maxMemory > 0)
+        samples.readWithin(options.maxMemory, kProcessBytes + kriging.ringBytes() +
+                                                  kThreadBytes * static_cast<std::uint64_t>(threadCount()));
+    const Window own = driftOutline(dump, options).data;
+    const int first = own.y - dump.header().data.y * options.scale;
+    samples.own(first, first + own.height);
+    kriging.run(sink, progress);
     return report;
 }
 

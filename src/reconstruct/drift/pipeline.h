@@ -1,20 +1,27 @@
 #pragma once
 
 #include "reconstruct/data/frame.h"
-#include "reconstruct/sequence/merge.h"
 #include "variolux/reconstruct/reconstruct.h"
 
 namespace vlx {
 
-/// What neighbouring frames add to a frame, at both resolutions; null: nothing.
-struct FrameMerge {
-    Merge *fine = nullptr, *coarse = nullptr;
-};
+/// Kriges a frame that shows what `dump` does, and gives the rows of the picture to `sink`. The clock is that
+/// of the frame, and adds to the DriftReport of `report`.
+class FrameKriging {
+  public:
+    FrameKriging(const SampleSource& dump, const Drift& options, Frame& frame, ReconstructionReport& report,
+                 StageClock& clock);
+    ~FrameKriging();
+    FrameKriging(const FrameKriging&) = delete;
+    FrameKriging& operator=(const FrameKriging&) = delete;
 
-/// Kriges a frame of `dump` as far as it is not filled, and gives the rows of the picture to `sink`. The
-/// clock is that of the frame, and adds to the DriftReport of `report`.
-void krigeFrame(const SampleSource& dump, const Drift& options, Frame& frame, const FrameMerge& merge,
-                ReconstructionReport& report, StageClock& clock, const RowSink& sink,
-                const Progress& progress);
+    /// Of all rows that are kept; none is taken yet when it is made.
+    std::uint64_t ringBytes() const;
+    void run(const RowSink& sink, const Progress& progress);
+
+  private:
+    class Stages;
+    std::unique_ptr<Stages> stages_;
+};
 
 }  // namespace vlx

@@ -20,8 +20,7 @@ struct ApartPlanes {
     static constexpr int kChannels = 7;
 };
 
-constexpr int kComparedRows = 112;  // a tile's, patches around, and as far ahead
-constexpr int kMergedRows = 300;
+constexpr int kComparedRows = 80;  // those filled at a time, and patches around
 
 float environment(const char* name, float value) {
     const char* text = std::getenv(name);
@@ -38,133 +37,114 @@ float rescaled(float value, float ratio) {
 
 }  // namespace
 
-Merge::Merge(const SampleLayout& layout, const LevelData& own, std::vector<Neighbour> before,
-             std::vector<Neighbour> after)
-    : layout_(layout),
-      planes_{layout.radiance},
-      featurePlanes_{layout.features},
-      own_(own),
+Merge::Merge(const SampledFrame& own, std::vector<const SampledFrame*> before,
+             std::vector<const SampledFrame*> after)
+    : own_(own),
+      layout_(own.frame().layout()),
+      planes_{layout_.radiance},
+      featurePlanes_{layout_.features},
       before_(std::move(before)),
       after_(std::move(after)),
-      width_(own.width()),
-      height_(own.height()),
+      width_(own.frame().width()),
+      height_(own.frame().height()),
       apart_(width_, ApartPlanes::kChannels * static_cast<int>(neighbours()),
              std::min(kComparedRows, height_)),
-      merged_{RowRing(width_, planes_.count() + 1, std::min(kMergedRows, height_)),
-              RowRing(width_, featurePlanes_.channels(), std::min(kMergedRows, height_))} {}
+      counts_(own.frame().counts()) {}
 
-void Merge::startAbove(int first) {
-    mergedRows_ = std::max(0, first);
-    comparedRows_ = std::max(0, mergedRows_ - kPatchRadius);
-}
+void Merge::startAbove(int first) { comparedRows_ = std::max(0, first - kPatchRadius); }
 
-void Merge::fill(int until) {
-    until = std::min(until, height_);
-    while (mergedRows_ < until) {
-        const int end = std::min(until, mergedRows_ + kTile), compared = std::min(height_, end + kPatchRadius);
-        apart_.claim(comparedRows_, compared);
-        parallelFor(comparedRows_, compared, [&](std::int64_t y) { compareRow(static_cast<int>(y)); });
-        comparedRows_ = compared;
-        for (RowRing* ring : {&merged_.data, &merged_.features}) ring->claim(mergedRows_, end);
-        parallelFor(mergedRows_, end, [&](std::int64_t y) { mergeRow(static_cast<int>(y)); });
-        mergedRows_ = end;
-    }
+void Merge::fill(int first, int end, PixelRows& out) {
+    const int compared = std::min(height_, end + kPatchRadius);
+    apart_.claim(comparedRows_, compared);
+    parallelFor(comparedRows_, compared, [&](std::int64_t y) { compareRow(static_cast<int>(y)); });
+    comparedRows_ = compared;
+    parallelFor(first, end, [&](std::int64_t y) { mergeRow(static_cast<int>(y), out); });
 }
 
 void Merge::compareRow(int y) {
-    static const float mismatch = environment("VLX_MISMATCH", 0);
+    std::vector<float> places(2 * static_cast<std::size_t>(width_));
     for (const auto* list : {&before_, &after_}) {
-        const bool back = list == &before_;
-        std::vector<float> column(static_cast<std::size_t>(width_)), row(column.size());
+        const bool next = list == &after_;
         for (int x = 0; x < width_; ++x) {
-            column[static_cast<std::size_t>(x)] = static_cast<float>(x);
-            row[static_cast<std::size_t>(x)] = static_cast<float>(y);
+            places[2 * static_cast<std::size_t>(x)] = static_cast<float>(x);
+            places[2 * static_cast<std::size_t>(x) + 1] = static_cast<float>(y);
         }
-        const LevelData* from = &own_;
+        const SampledFrame* from = &own_;
         for (std::size_t k = 0; k < list->size(); ++k) {
-            const LevelData& there = *(*list)[k].data;
-            const std::vector<float>& scale = *(*list)[k].scale;
-            const int first = ApartPlanes::kChannels * static_cast<int>(back ? k : before_.size() + k);
-            const auto out = [&](int plane) { return apart_.row(first + plane, y); };
             for (int x = 0; x < width_; ++x) {
-                const auto i = static_cast<std::size_t>(x);
-                for (int plane = 0; plane < ApartPlanes::kChannels; ++plane) out(plane)[x] = 0;
-                out(ApartPlanes::kColumn)[x] = -1;
-                if (!(column[i] > -0.5f && column[i] < static_cast<float>(width_) - 0.5f && row[i] > -0.5f &&
-                      row[i] < static_cast<float>(height_) - 0.5f)) {
-                    column[i] = -1;
-                    continue;
+                float* const place = places.data() + 2 * static_cast<std::size_t>(x);
+                const auto inside = [&] {
+                    return place[0] > -0.5f && place[0] < static_cast<float>(width_) - 0.5f && place[1] > -0.5f &&
+                           place[1] < static_cast<float>(height_) - 0.5f;
+                };
+                if (inside() && from->motion().channels() > 0) {
+                    const auto col = static_cast<int>(std::lround(place[0])),
+                               row = static_cast<int>(std::lround(place[1]));
+                    place[0] += from->motion().row(MotionPlanes::x(next), row)[col];
+                    place[1] += from->motion().row(MotionPlanes::y(next), row)[col];
                 }
-                const int fromX = static_cast<int>(std::lround(column[i])),
-                          fromY = static_cast<int>(std::lround(row[i]));
-                if (from->motion().channels() > 0) {
-                    column[i] += from->motion().row(MotionPlanes::x(!back), fromY)[fromX];
-                    row[i] += from->motion().row(MotionPlanes::y(!back), fromY)[fromX];
-                }
-                if (!(column[i] > -0.5f && column[i] < static_cast<float>(width_) - 0.5f && row[i] > -0.5f &&
-                      row[i] < static_cast<float>(height_) - 0.5f)) {
-                    column[i] = -1;
-                    continue;
-                }
-                const int toX = static_cast<int>(std::lround(column[i])),
-                          toY = static_cast<int>(std::lround(row[i]));
-                out(ApartPlanes::kColumn)[x] = static_cast<float>(toX);
-                out(ApartPlanes::kRow)[x] = static_cast<float>(toY);
-                for (int half = 0; half < 2; ++half) {
-                    const float n = own_.data().row(planes_.halfCount(half), y)[x],
-                                m = there.data().row(planes_.halfCount(half), toY)[toX];
-                    if (n <= 0 || m <= 0) continue;
-                    float squares = 0, noise = 0, other = 0, sum = 0;
-                    for (int c = 0; c < 3; ++c) {
-                        const float a = own_.data().row(planes_.mean(half) + c, y)[x],
-                                    b = there.data().row(planes_.mean(half) + c, toY)[toX];
-                        const float u = own_.variances().row(c, y)[x] / std::max(1.f, n),
-                                    v = there.variances().row(c, toY)[toX] / std::max(1.f, m);
-                        squares += (a - b) * (a - b);
-                        noise += u;
-                        other += v;
-                        sum += kLeastSquare + 1e-6f * (a * a + b * b) + u + v;
-                    }
-                    out(ApartPlanes::difference(half))[x] = (squares - (noise + other)) / sum;
-                    out(ApartPlanes::known(half))[x] = 1;
-                }
-                float distance = 0;
-                for (int f = 0; f < layout_.features; ++f) {
-                    const float ratio =
-                        scale[static_cast<std::size_t>(f)] / layout_.scale[static_cast<std::size_t>(f)];
-                    const float d = own_.features().row(f, y)[x] -
-                                    rescaled(there.features().row(f, toY)[toX], ratio);
-                    distance += d * d /
-                                (kFeatureWidth2 +
-                                 2 * (own_.features().row(featurePlanes_.error(f), y)[x] +
-                                      ratio * ratio * there.features().row(featurePlanes_.error(f), toY)[toX]));
-                }
-                if (mismatch > 0 && there.motion().channels() > 0) {
-                    const float ex = there.motion().row(MotionPlanes::x(back), toY)[toX] +
-                                     from->motion().row(MotionPlanes::x(!back), fromY)[fromX],
-                                ey = there.motion().row(MotionPlanes::y(back), toY)[toX] +
-                                     from->motion().row(MotionPlanes::y(!back), fromY)[fromX];
-                    const float e = ex * ex + ey * ey;
-                    distance += e == e ? mismatch * e : 100;
-                }
-                out(ApartPlanes::kFeatures)[x] = distance;
+                if (!inside()) place[0] = place[1] = -1;
             }
-            from = &there;
+            compareRow(y, *(*list)[k], places.data(), next ? before_.size() + k : k);
+            from = (*list)[k];
         }
     }
 }
 
-void Merge::mergeRow(int y) {
-    static const float sharp = environment("VLX_SHARP", 2), features = environment("VLX_FEATURES", 1);
-    const int radiance = layout_.radiance;
+void Merge::compareRow(int y, const SampledFrame& there, const float* places, std::size_t k) {
+    const LevelData &a = own_.frame().fine(), &b = there.frame().fine();
+    const std::vector<float>& scale = there.frame().layout().scale;
+    const auto out = [&](int plane) {
+        return apart_.row(ApartPlanes::kChannels * static_cast<int>(k) + plane, y);
+    };
+    for (int plane = 0; plane < ApartPlanes::kChannels; ++plane) std::fill_n(out(plane), width_, 0.f);
+    for (int x = 0; x < width_; ++x) {
+        const auto col = static_cast<int>(std::lround(places[2 * x])),
+                   row = static_cast<int>(std::lround(places[2 * x + 1]));
+        out(ApartPlanes::kColumn)[x] = static_cast<float>(col);
+        out(ApartPlanes::kRow)[x] = static_cast<float>(row);
+        if (col < 0) continue;
+        for (int half = 0; half < 2; ++half) {
+            const float n = a.data().row(planes_.halfCount(half), y)[x],
+                        m = b.data().row(planes_.halfCount(half), row)[col];
+            if (n <= 0 || m <= 0) continue;
+            float squares = 0, noise = 0, sum = 0;
+            for (int c = 0; c < 3; ++c) {
+                const float z = a.data().row(planes_.mean(half) + c, y)[x],
+                            t = b.data().row(planes_.mean(half) + c, row)[col];
+                const float v = a.variances().row(c, y)[x] / std::max(1.f, n) +
+                                b.variances().row(c, row)[col] / std::max(1.f, m);
+                squares += (z - t) * (z - t);
+                noise += v;
+                sum += kLeastSquare + 1e-6f * (z * z + t * t) + v;
+            }
+            out(ApartPlanes::difference(half))[x] = (squares - noise) / sum;
+            out(ApartPlanes::known(half))[x] = 1;
+        }
+        float distance = 0;
+        for (int f = 0; f < layout_.features; ++f) {
+            const auto i = static_cast<std::size_t>(f);
+            const float ratio = scale[i] / layout_.scale[i];
+            const float d = a.features().row(f, y)[x] - rescaled(b.features().row(f, row)[col], ratio);
+            distance += d * d /
+                        (kFeatureWidth2 + 2 * (a.features().row(featurePlanes_.error(f), y)[x] +
+                                               ratio * ratio * b.features().row(featurePlanes_.error(f), row)[col]));
+        }
+        out(ApartPlanes::kFeatures)[x] = distance;
+    }
+}
+
+/// Of each neighbour and half, for the pixels of a row.
+std::vector<float> Merge::weightsOf(int y) const {
+    static const float sharp = environment("VLX_SHARP", 2), features = environment("VLX_FEATURES", 0.3f);
     const auto w = static_cast<std::size_t>(width_);
-    // Sums over patches of differences and of how many there are.
     std::vector<float> weights(2 * neighbours() * w), columns(2 * w);
     for (std::size_t k = 0; k < neighbours(); ++k) {
         const int first = ApartPlanes::kChannels * static_cast<int>(k);
         for (int half = 0; half < 2; ++half) {
             std::fill(columns.begin(), columns.end(), 0.f);
-            for (int row = std::max(0, y - kPatchRadius); row <= std::min(height_ - 1, y + kPatchRadius); ++row) {
+            for (int row = std::max(0, y - kPatchRadius); row <= std::min(height_ - 1, y + kPatchRadius);
+                 ++row) {
                 const float* const d = apart_.row(first + ApartPlanes::difference(half), row);
                 const float* const n = apart_.row(first + ApartPlanes::known(half), row);
                 for (std::size_t x = 0; x < w; ++x) {
@@ -176,7 +156,8 @@ void Merge::mergeRow(int y) {
             const float* const unlike = apart_.row(first + ApartPlanes::kFeatures, y);
             for (int x = 0; x < width_; ++x) {
                 float sum = 0, count = 0;
-                for (int i = std::max(0, x - kPatchRadius); i <= std::min(width_ - 1, x + kPatchRadius); ++i) {
+                for (int i = std::max(0, x - kPatchRadius); i <= std::min(width_ - 1, x + kPatchRadius);
+                     ++i) {
                     sum += columns[static_cast<std::size_t>(i)];
                     count += columns[w + static_cast<std::size_t>(i)];
                 }
@@ -187,69 +168,88 @@ void Merge::mergeRow(int y) {
             }
         }
     }
-    std::vector<float> value(static_cast<std::size_t>(std::max(radiance, 2 * layout_.features)));
+    return weights;
+}
+
+void Merge::mergeRow(int y, PixelRows& out) const {
+    const auto w = static_cast<std::size_t>(width_);
+    const std::vector<float> weights = weightsOf(y);
+    const LevelData& own = own_.frame().fine();
+    struct Datum {
+        const PixelRows* rows;
+        const std::vector<float>* scale;
+        int x, y;
+        float weight[2];
+    };
+    std::vector<Datum> data;
     for (int x = 0; x < width_; ++x) {
-        const auto at = [&](std::size_t k, int half) {
-            return weights[(2 * k + static_cast<std::size_t>(half)) * w + static_cast<std::size_t>(x)];
-        };
-        const auto place = [&](std::size_t k, int plane) {
-            return static_cast<int>(apart_.row(ApartPlanes::kChannels * static_cast<int>(k) + plane, y)[x]);
-        };
-        for (int half = 0; half < 2; ++half) {
-            const float n = own_.data().row(planes_.halfCount(half), y)[x];
-            float total = n, squares = n;
-            for (int c = 0; c < radiance; ++c)
-                value[static_cast<std::size_t>(c)] = n * own_.data().row(planes_.mean(half) + c, y)[x];
-            for (std::size_t k = 0; k < neighbours(); ++k) {
-                const float weight = at(k, half);
-                if (weight <= 0) continue;
-                const RowRing& data = neighbour(k).data->data();
-                const int col = place(k, ApartPlanes::kColumn), row = place(k, ApartPlanes::kRow);
-                const float m = data.row(planes_.halfCount(half), row)[col];
-                if (m <= 0) continue;
-                total += weight * m;
-                squares += weight * weight * m;
-                for (int c = 0; c < radiance; ++c)
-                    value[static_cast<std::size_t>(c)] += weight * m * data.row(planes_.mean(half) + c, row)[col];
-            }
-            for (int c = 0; c < radiance; ++c)
-                merged_.data.row(planes_.mean(half) + c, y)[x] =
-                    total > 0 ? value[static_cast<std::size_t>(c)] / total
-                              : own_.data().row(planes_.mean(half) + c, y)[x];
-            merged_.data.row(planes_.halfCount(half), y)[x] = total > 0 ? total * total / squares : 0;
-        }
-        merged_.data.row(planes_.count(), y)[x] = merged_.data.row(planes_.halfCount(0), y)[x] +
-                                                  merged_.data.row(planes_.halfCount(1), y)[x];
-        const float n =
-            own_.data().row(planes_.halfCount(0), y)[x] + own_.data().row(planes_.halfCount(1), y)[x];
-        float total = n > 0 ? n : 1e-3f;
-        for (int f = 0; f < layout_.features; ++f) {
-            value[static_cast<std::size_t>(f)] = total * own_.features().row(f, y)[x];
-            value[static_cast<std::size_t>(layout_.features + f)] =
-                total * total * own_.features().row(featurePlanes_.error(f), y)[x];
-        }
+        data.assign(1, {&own.pixels(), &layout_.scale, x, y, {1, 1}});
         for (std::size_t k = 0; k < neighbours(); ++k) {
-            if (at(k, 0) + at(k, 1) <= 0) continue;
-            const Neighbour& of = neighbour(k);
-            const int col = place(k, ApartPlanes::kColumn), row = place(k, ApartPlanes::kRow);
-            float weight = 0;
-            for (int half = 0; half < 2; ++half)
-                weight += at(k, half) * of.data->data().row(planes_.halfCount(half), row)[col];
-            total += weight;
-            for (int f = 0; f < layout_.features; ++f) {
-                const float ratio =
-                    (*of.scale)[static_cast<std::size_t>(f)] / layout_.scale[static_cast<std::size_t>(f)];
-                value[static_cast<std::size_t>(f)] +=
-                    weight * rescaled(of.data->features().row(f, row)[col], ratio);
-                value[static_cast<std::size_t>(layout_.features + f)] +=
-                    weight * weight * ratio * ratio *
-                    of.data->features().row(featurePlanes_.error(f), row)[col];
+            const int first = ApartPlanes::kChannels * static_cast<int>(k);
+            const auto col = static_cast<int>(apart_.row(first + ApartPlanes::kColumn, y)[x]),
+                       row = static_cast<int>(apart_.row(first + ApartPlanes::kRow, y)[x]);
+            if (col < 0) continue;
+            const PixelRows& rows = neighbour(k).frame().fine().pixels();
+            if (rows.data.row(planes_.count(), row)[col] <= 0) continue;
+            const std::size_t at = 2 * k * w + static_cast<std::size_t>(x);
+            data.push_back({&rows, &neighbour(k).frame().layout().scale, col, row, {weights[at], weights[at + w]}});
+        }
+        const auto value = [&](const Datum& of, RowRing PixelRows::* ring, int plane) {
+            return (of.rows->*ring).row(plane, of.y)[of.x];
+        };
+        float count = 0;
+        for (int half = 0; half < 2; ++half) {
+            float total = 0, squares = 0;
+            for (const Datum& of : data) {
+                const float n = value(of, &PixelRows::data, planes_.halfCount(half));
+                total += of.weight[half] * n;
+                squares += of.weight[half] * of.weight[half] * n;
             }
+            for (int c = 0; c < layout_.radiance; ++c) {
+                float sum = 0;
+                for (const Datum& of : data)
+                    sum += of.weight[half] * value(of, &PixelRows::data, planes_.halfCount(half)) *
+                           value(of, &PixelRows::data, planes_.mean(half) + c);
+                out.data.row(planes_.mean(half) + c, y)[x] =
+                    total > 0 ? sum / total : value(data[0], &PixelRows::data, planes_.mean(half) + c);
+            }
+            const float samples = total > 0 ? total * total / squares : 0;
+            out.data.row(planes_.halfCount(half), y)[x] = samples;
+            count += samples;
+        }
+        out.data.row(planes_.count(), y)[x] = count;
+        out.data.row(planes_.stated(), y)[x] = value(data[0], &PixelRows::data, planes_.stated());
+        out.data.row(planes_.gap(), y)[x] = count > 0 ? 0 : value(data[0], &PixelRows::data, planes_.gap());
+        // What both halves have in common.
+        const auto share = [&](const Datum& of) { return (of.weight[0] + of.weight[1]) / 2; };
+        float total = 0;
+        for (const Datum& of : data) total += share(of) * value(of, &PixelRows::data, planes_.count());
+        const auto weight = [&](const Datum& of) {
+            return total > 0 ? share(of) * value(of, &PixelRows::data, planes_.count()) / total
+                             : static_cast<float>(&of == data.data());
+        };
+        for (int c = 0; c < 3; ++c) {
+            float sum = 0;
+            for (const Datum& of : data) sum += weight(of) * value(of, &PixelRows::data, planes_.removed() + c);
+            out.data.row(planes_.removed() + c, y)[x] = sum;
+        }
+        for (int k = 0; k < SquaresPlanes::kChannels; ++k) {
+            float sum = 0;
+            for (const Datum& of : data) sum += share(of) * value(of, &PixelRows::squares, k);
+            out.squares.row(k, y)[x] = sum;
         }
         for (int f = 0; f < layout_.features; ++f) {
-            merged_.features.row(f, y)[x] = value[static_cast<std::size_t>(f)] / total;
-            merged_.features.row(featurePlanes_.error(f), y)[x] =
-                value[static_cast<std::size_t>(layout_.features + f)] / (total * total);
+            float mean = 0, error = 0, difference = 0;
+            for (const Datum& of : data) {
+                const auto i = static_cast<std::size_t>(f);
+                const float ratio = (*of.scale)[i] / layout_.scale[i], part = weight(of);
+                mean += part * rescaled(value(of, &PixelRows::raw, featurePlanes_.value(f)), ratio);
+                error += part * part * ratio * ratio * value(of, &PixelRows::raw, featurePlanes_.error(f));
+                difference += part * ratio * value(of, &PixelRows::raw, featurePlanes_.difference(f));
+            }
+            out.raw.row(featurePlanes_.value(f), y)[x] = mean;
+            out.raw.row(featurePlanes_.error(f), y)[x] = error;
+            out.raw.row(featurePlanes_.difference(f), y)[x] = difference;
         }
     }
 }

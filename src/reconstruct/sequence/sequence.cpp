@@ -1,10 +1,10 @@
 #include "variolux/reconstruct/sequence.h"
 
 #include <map>
-#include <optional>
 
 #include "reconstruct/common/methods.h"
 #include "reconstruct/drift/pipeline.h"
+#include "reconstruct/sequence/merge.h"
 #include "variolux/base/error.h"
 
 namespace vlx {
@@ -13,21 +13,21 @@ namespace {
 
 /// A frame with all that its samples say.
 struct LoadedFrame {
-    LoadedFrame(std::unique_ptr<SampleSource> samples, const Drift& options)
-        : source(std::move(samples)),
+    LoadedFrame(std::unique_ptr<SampleSource> dump, const Drift& options)
+        : source(std::move(dump)),
           outline(driftOutline(*source, options)),
           clock(seconds),
-          frame(*source, options, Kept::Whole, clock) {
+          samples(*source, options, Kept::Whole, clock) {
         const int first = outline.data.y - source->header().data.y * options.scale;
-        frame.own(first, first + outline.data.height);
-        frame.fillAll();
+        samples.own(first, first + outline.data.height);
+        samples.frame().fillAll();
     }
 
     std::unique_ptr<SampleSource> source;
     Image outline;
     std::map<std::string, double> seconds;
     StageClock clock;
-    Frame frame;
+    SampledFrame samples;
 };
 
 }  // namespace
@@ -45,12 +45,12 @@ struct Sequence::Impl {
         return at->second.get();
     }
     /// Frames beside `frame`, the nearest first, up to one that is not there.
-    std::vector<LoadedFrame*> beside(int frame, int step) {
-        std::vector<LoadedFrame*> found;
+    std::vector<const SampledFrame*> beside(int frame, int step) {
+        std::vector<const SampledFrame*> found;
         for (int k = 1; k <= options.temporal; ++k) {
             LoadedFrame* const there = load(frame + step * k);
             if (!there) break;
-            found.push_back(there);
+            found.push_back(&there->samples);
         }
         return found;
     }
@@ -67,21 +67,14 @@ ReconstructionReport Sequence::reconstruct(int frame, const RowSink& sink, const
         return entry.first < frame - reach || entry.first > frame + reach;
     });
     LoadedFrame& own = *impl_->load(frame);
-    const std::vector<LoadedFrame*> before = impl_->beside(frame, -1), after = impl_->beside(frame, 1);
-    const auto at = [](const std::vector<LoadedFrame*>& list, bool coarse) {
-        std::vector<Neighbour> of;
-        for (const LoadedFrame* there : list)
-            of.push_back({coarse ? &there->frame.coarse() : &there->frame.fine(), &there->frame.layout().scale});
-        return of;
-    };
     ReconstructionReport report;
     report.method.emplace<DriftReport>().seconds = own.seconds;
     StageClock clock(std::get<DriftReport>(report.method).seconds);
-    Merge fine(own.frame.layout(), own.frame.fine(), at(before, false), at(after, false));
-    std::optional<Merge> coarse;
-    if (own.frame.halved()) coarse.emplace(own.frame.layout(), own.frame.coarse(), at(before, true), at(after, true));
-    krigeFrame(*own.source, impl_->options, own.frame, {&fine, coarse ? &*coarse : nullptr}, report, clock, sink,
-               progress);
+    Merge merge(own.samples, impl_->beside(frame, -1), impl_->beside(frame, 1));
+    const Frame& plain = own.samples.frame();
+    Frame merged(plain.layout(), plain.picture(), impl_->options, plain.width(), plain.height(), Kept::Rows,
+                 merge, clock);
+    FrameKriging(*own.source, impl_->options, merged, report, clock).run(sink, progress);
     return report;
 }
 
