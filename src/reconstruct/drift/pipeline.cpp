@@ -30,9 +30,9 @@ constexpr int kCorrectedRows = 88;  // and differences
 constexpr int kCleanRows = 56;      // of 32 that go out together, and the light around them
 constexpr int kFinishingRows = 72;  // and their sums
 
-// What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries
-// that it maps, and each thread's tiles.
-constexpr std::uint64_t kProcessBytes = 150'000'000;
+// What a process holds besides its rows, rounded up from 12 and 4 MB measured on Debian 12: the libraries
+// that it maps, unless it holds more already, and what else it takes; and each thread's tiles.
+constexpr std::uint64_t kProcessBytes = 25'000'000, kFurtherBytes = 10'000'000;
 constexpr std::uint64_t kThreadBytes = 8'000'000;
 
 Window scaled(const Window& window, int scale) {
@@ -113,6 +113,7 @@ class Pipeline {
             drift_.energyRemoved = removed_ / luminance_;
             drift_.energyReturned = returned_ / luminance_;
         }
+        drift_.light = 0;
         if (samplesLight_ > 0) {
             drift_.light = imageLight_ / samplesLight_;
             // Of the samples as they came; where pixels have one sample, what their neighbours say of it.
@@ -177,7 +178,7 @@ class Pipeline {
             }
             samples = std::max(samples, ofRow);
         }
-        const std::uint64_t held = kProcessBytes + ringBytes() +
+        const std::uint64_t held = std::max(kProcessBytes, residentMemory() + kFurtherBytes) + ringBytes() +
                                    kThreadBytes * static_cast<std::uint64_t>(threadCount()) +
                                    (gaps ? GapField::bytes(dump_, layout_) : 0);
         // The values of a row, twice where they are sorted into parts of pixels; and, on each thread that
