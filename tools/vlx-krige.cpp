@@ -235,6 +235,9 @@ int run(vlx::KrigeOptions& o) {
         o.krige.band = vlx::parseBand(o.band);
         if (o.filter != vlx::PixelFilter::Box)  // it reaches into the bands beside
             throw CLI::ValidationError("--band goes with --filter box");
+        if (!o.samplingMap.empty())
+            throw CLI::ValidationError(
+                "--band goes without --sampling-map, whose mean is that of the picture");
         if (o.diagnostics)
             throw CLI::ValidationError("--band goes without --diagnostics, whose regions it would cut");
     }

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
 
 #include "variolux/base/error.h"
 
@@ -15,6 +16,13 @@ std::uint64_t availableMemory() {
     rlimit limit{};
     if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return machine;
     return std::min<std::uint64_t>(machine, limit.rlim_cur);
+}
+
+std::uint64_t residentMemory() {
+    std::ifstream file("/proc/self/statm");
+    std::uint64_t whole = 0, resident = 0;
+    if (!(file >> whole >> resident)) return 0;
+    return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
 }
 
 void requireMemory(std::string_view path, std::uint64_t bytes, std::string_view what) {

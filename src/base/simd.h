@@ -7,8 +7,10 @@
 
 /// Where the compiler vectorises by itself: marks a function with long loops over floats, which is compiled
 /// for AVX2 as well and chosen at run time. Not under sanitizers, whose instrumented resolvers run before
-/// their runtime is ready.
-#if defined(__x86_64__) && !defined(VARIOLUX_SANITIZED)
+/// their runtime is ready; nor without optimisation, which has no use for it. What takes or returns vectors
+/// is always inlined: compiled by itself, for another instruction set than its caller, it would look for them
+/// in other registers.
+#if defined(__x86_64__) && defined(__OPTIMIZE__) && !defined(VARIOLUX_SANITIZED)
 #define VLX_WIDE __attribute__((target_clones("avx2", "default")))
 #else
 #define VLX_WIDE

@@ -50,7 +50,9 @@ void arrangeParts(std::vector<PicturePart>& parts, const Window& whole, const st
         std::sort(row.begin(), row.end(),
                   [](const PicturePart* a, const PicturePart* b) { return a->data.x < b->data.x; });
         const auto missing = [&](std::int64_t first, std::int64_t end) {
-            throw Error(output, "no part holds rows " + range(*top, *low) + ", columns " + range(first, end));
+            throw Error(output,
+                        "no part holds rows " + range(*top, *low) + ", columns " + range(first, end) +
+                            (boundsOf(parts) == whole ? "" : " (--crop: they are of a part of the picture)"));
         };
         std::int64_t next = whole.x;
         const PicturePart* last = nullptr;

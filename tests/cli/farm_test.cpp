@@ -187,6 +187,11 @@ TEST_F(Finished, ImagesNeedAllTheirOutputs) {
     EXPECT_FALSE(works("vlx-krige", command, out));
     fs::remove(map);
     EXPECT_TRUE(works("vlx-krige", command, out));
+    // Scaled to the picture's mean: of bands it would be another map.
+    const ToolRun band =
+        runTool("vlx-krige", {kDump, "-o", out, "--sampling-map", map, "--band", "1/2", "--overwrite"});
+    EXPECT_EQ(band.exitCode, 2);
+    EXPECT_NE(band.err.find("--band goes without --sampling-map"), std::string::npos) << band.err;
     const Arguments paper = {kDump, "-o", out, "--method", "paper", "--diagnostics"};
     EXPECT_TRUE(works("vlx-krige", paper, out));
     fs::remove(out + ".json");
@@ -293,6 +298,7 @@ TEST(MaxMemory, IsKeptAndTheImageIsTheSame) {
     ASSERT_EQ(tight.exitCode, 0) << contentsOf(errors);
     EXPECT_LE(tight.peakBytes, least * 1'000'000);
     EXPECT_LT(tight.peakBytes, free.peakBytes);
+    EXPECT_LT(least * 1'000'000, free.peakBytes) << "no limit is refused that is kept without one";
     EXPECT_EQ(readImage(folder / "tight.exr").pixels, readImage(folder / "free.exr").pixels);
 }
 

@@ -10,6 +10,9 @@ namespace vlx {
 /// Memory of this machine, or less where this process may take less (ulimit -v).
 std::uint64_t availableMemory();
 
+/// What this process holds now, as the kernel counts it; 0 where it does not tell.
+std::uint64_t residentMemory();
+
 /// Throws Error, naming `path`, when `bytes` for `what` are more than there are. Systems promise more memory
 /// than they have, and end the process that takes it.
 void requireMemory(std::string_view path, std::uint64_t bytes, std::string_view what);

@@ -54,8 +54,8 @@ const std::vector<DumpChannel>& standardChannels();
 /// of many. Negative: not known. The variance of the mean of a pixel's n samples is their sum divided by n^2.
 inline constexpr std::string_view kVarianceChannels[] = {"variance.R", "variance.G", "variance.B"};
 
-/// How far from a sample's position, in raster pixels, what its camera ray meets first was in the frame before
-/// and will be in the next. Not finite: not known.
+/// How far from a sample's position, in raster pixels, what its camera ray meets first was in the frame
+/// before and will be in the next. Not finite: not known.
 inline constexpr std::string_view kMotionChannels[] = {"motion.x", "motion.y", "motionNext.x",
                                                        "motionNext.y"};
 

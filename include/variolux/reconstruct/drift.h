@@ -124,7 +124,7 @@ struct Drift {
     std::vector<std::pair<int, int>> inspect = {};
 
     int temporal = 0;  ///< frames before and after that add to a frame of a sequence (sequence.h)
-    int scale = 1;  ///< 1 to 4: pixels of the image along each axis for one of the dump
+    int scale = 1;     ///< 1 to 4: pixels of the image along each axis for one of the dump
     DriftSteps steps = {};
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit
 

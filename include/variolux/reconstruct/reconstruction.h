@@ -75,17 +75,17 @@ struct ResidualRegion {
 
 /// What the default method did.
 struct DriftReport {
-    std::int64_t farPixels = 0;          ///< empty, and with no samples within 5 pixels either
-    std::int64_t exactPixels = 0;        ///< the dump states an error of 0: kept as they are
-    std::int64_t limitedSamples = 0;     ///< made darker by the firefly estimator
-    double energyRemoved = 0;            ///< share of all samples' luminance that this took away
-    double energyReturned = 0;           ///< and that was moved back to where samples have more than the
-                                         ///< estimate, whether fireflies lost it or not
-    double light = 1;                    ///< luminance of the image over that of all samples, as they came:
-                                         ///< sums over samples (a pixel counts as often as it was sampled)
-    double lightError = 0;               ///< standard error of the samples', as a share of it
-    std::int64_t neighbourhoods = 0;     ///< kriged, over models and halves
-    std::int64_t ownNeighbourhoods = 0;  ///< centred on pixels unlike their regular centres
+    std::int64_t farPixels = 0;       ///< empty, and with no samples within 5 pixels either
+    std::int64_t exactPixels = 0;     ///< the dump states an error of 0: kept as they are
+    std::int64_t limitedSamples = 0;  ///< made darker by the firefly estimator
+    double energyRemoved = 0;         ///< share of all samples' luminance that this took away
+    double energyReturned = 0;        ///< and that was moved back to where samples have more than the
+                                      ///< estimate, whether fireflies lost it or not
+    double light = 1;                 ///< luminance of the image over that of all samples, as they came:
+                       ///< sums over samples (a pixel counts as often as it was sampled); 0: there is none
+    double lightError = 0;                  ///< standard error of the samples', as a share of it
+    std::int64_t neighbourhoods = 0;        ///< kriged, over models and halves
+    std::int64_t ownNeighbourhoods = 0;     ///< centred on pixels unlike their regular centres
     std::int64_t failedNeighbourhoods = 0;  ///< not solvable: their weighted mean
     std::int64_t driftFeatures = 0;         ///< sum over neighbourhoods of the features that vary there; the
                                             ///< others are no drift

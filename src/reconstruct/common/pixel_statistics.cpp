@@ -15,7 +15,7 @@ namespace {
 constexpr int kScaleRows = 16;
 constexpr double kScalePercentile = 0.99;
 constexpr float kMostMotion = 1e5f;  // pixels: what moves farther in a frame is not known
-constexpr float kMedians = 4;  // of a feature's magnitude: its scale, at most
+constexpr float kMedians = 4;        // of a feature's magnitude: its scale, at most
 
 void addFeatures(const DumpHeader& header, const std::vector<std::string>& channels, SampleLayout& layout) {
     for (const std::string& channel : channels)
@@ -205,9 +205,8 @@ void gatherMotion(const SampleBand& band, const SampleLayout& layout, int bandRo
                 ++count[k];
             }
         for (std::size_t k = 0; k < MotionPlanes::kChannels; ++k)
-            ring.row(static_cast<int>(k), y)[x] =
-                count[k] > 0 ? static_cast<float>(scale * sum[k] / count[k])
-                             : std::numeric_limits<float>::quiet_NaN();
+            ring.row(static_cast<int>(k), y)[x] = count[k] > 0 ? static_cast<float>(scale * sum[k] / count[k])
+                                                               : std::numeric_limits<float>::quiet_NaN();
     }
 }
 

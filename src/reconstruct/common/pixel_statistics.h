@@ -27,7 +27,7 @@ struct SampleLayout {
     bool independentHalves = false;  ///< DumpHeader's, of the samples as they are gathered
     int replicate = -1;              ///< index in `names`
     int position = -1;  ///< index in `names` of sample.x, sample.y after it; where they are needed
-    int motion = -1;  ///< index in `names` of the first of kMotionChannels, all four of which are there
+    int motion = -1;    ///< index in `names` of the first of kMotionChannels, all four of which are there
     int variance = -1;  ///< index in `names` of the first of kVarianceChannels, all three of which are there
 };
 

@@ -167,6 +167,16 @@ std::string inWords(const PaperReport& report) {
     return text.str();
 }
 
+std::string lightInWords(const DriftReport& report) {
+    std::ostringstream text;
+    if (report.light > 0)
+        text << "the image has " << 100 * report.light << " % of its samples' light (standard error "
+             << 100 * report.lightError << " %)\n";
+    else
+        text << "no sample has light\n";
+    return text.str();
+}
+
 std::string inWords(const DriftReport& report) {
     constexpr double kMuchLight = 0.1;
     std::ostringstream text;
@@ -176,10 +186,9 @@ std::string inWords(const DriftReport& report) {
          << (report.energyRemoved - report.energyReturned > kMuchLight
                  ? " (WARNING: much; where few samples find the light, --fireflies keep keeps it)\n"
                  : "\n")
-         << "the image has " << 100 * report.light << " % of its samples' light (standard error "
-         << 100 * report.lightError << " %)\n"
-         << report.neighbourhoods << " neighbourhoods kriged, "
-         << perNeighbourhood(report, report.driftFunctions) << " drift functions on average, "
+         << lightInWords(report) << report.neighbourhoods << " neighbourhoods kriged, "
+         << std::round(100 * perNeighbourhood(report, report.driftFunctions)) / 100
+         << " drift functions on average, "
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
     if (const auto& of = report.secondOpinion)
         text << "the kriging weighs " << 100 * of->weight << " %, the other image the rest ("

@@ -35,8 +35,8 @@ class PixelSource {
 class Frame {
   public:
     /// All that it is given must live as long.
-    Frame(const SampleLayout& layout, const PictureScale& picture, const Drift& options, int width, int height,
-          Kept kept, PixelSource& source, StageClock& clock);
+    Frame(const SampleLayout& layout, const PictureScale& picture, const Drift& options, int width,
+          int height, Kept kept, PixelSource& source, StageClock& clock);
     Frame(const Frame&) = delete;
     Frame& operator=(const Frame&) = delete;
 

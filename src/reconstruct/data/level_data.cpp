@@ -97,8 +97,8 @@ void LevelData::fill(int until) {
     variances_.claim(varianceRows_, until);
     parallelFor(varianceRows_, until, [&](std::int64_t y) {
         smoothVariances(pixels_.squares, pixels_.data, {radiance_}, features_, layout_.features, picture_,
-                        unseen_, wider_ ? &wider_->variances_ : nullptr, static_cast<int>(y), width_,
-                        height_, variances_);
+                        unseen_, wider_ ? &wider_->variances_ : nullptr, static_cast<int>(y), width_, height_,
+                        variances_);
     });
     varianceRows_ = until;
     clock_.addTo("variances");

@@ -42,7 +42,7 @@ template <int Channels>
             const int there = (row + dy + kTileMargin) * kTileSide + column + dx + kTileMargin;
             const Eight weight = simd::nearExp(simd::maximum(load<Eight>(distances + here), Eight{})) *
                                  load<Eight>(inside + column + dx);
-            const auto add = [&](float* to, Eight value) {
+            const auto add = [&](float* to, Eight value) __attribute__((always_inline)) {
                 store(to + here, load<Eight>(to + here) + value);
             };
             add(sums.total(), weight);

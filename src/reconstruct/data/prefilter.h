@@ -2,8 +2,8 @@
 
 #include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/pixel_statistics.h"
-#include "reconstruct/drift/patch_similarity.h"
 #include "reconstruct/data/pixel_data.h"
+#include "reconstruct/drift/patch_similarity.h"
 
 /// What kriging needs besides the means: features without noise, error variances without noise or bias.
 namespace vlx {

@@ -19,10 +19,10 @@ constexpr int kGatheredRows = 64;  // those filled at a time, 11 around them, an
 SampleLayout layoutOf(const SampleSource& dump, const Drift& options) {
     SampleLayout layout = chooseSampleLayout(dump, options);
     if (layout.features + 5 > kMaxRandomDrift || layout.radiance > kMaxRandomDrift)
-        throw Error(dump.path(),
-                    "expected at most " + std::to_string(kMaxRandomDrift - 5) + " features and " +
-                        std::to_string(kMaxRandomDrift) + " radiance channels, found " +
-                        std::to_string(layout.features) + " and " + std::to_string(layout.radiance));
+        throw Error(dump.path(), "expected at most " + std::to_string(kMaxRandomDrift - 5) +
+                                     " features and " + std::to_string(kMaxRandomDrift) +
+                                     " radiance channels, found " + std::to_string(layout.features) +
+                                     " and " + std::to_string(layout.radiance));
     return layout;
 }
 

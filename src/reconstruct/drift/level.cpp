@@ -10,8 +10,8 @@ namespace vlx {
 namespace {
 
 // Rows kept at each stage, likewise (level_data.cpp).
-constexpr int kSumRows = 64;                           // a tile's, and kMaxReach around: 62
-constexpr int kEstimateRows = 100;                     // and moments
+constexpr int kSumRows = 64;        // a tile's, and kMaxReach around: 62
+constexpr int kEstimateRows = 100;  // and moments
 constexpr int kCombinedRows = 88;
 
 }  // namespace
@@ -74,8 +74,9 @@ void Level::krige(int until) {
         const int y = krigedRows_;
         data_.fill(y + kTile + kTileMargin);
         static std::atomic<std::int64_t> rowsKriged = 0;  // of all levels: no two inputs have one number
-        TileInput input{&data_.data(), &data_.features(), &data_.variances(), {radiance_}, layout_.features,
-                        layout_.group, layout_.groups,    width_,             height_,     ++rowsKriged};
+        TileInput input{&data_.data(),    &data_.features(), &data_.variances(), {radiance_},
+                        layout_.features, layout_.group,     layout_.groups,     width_,
+                        height_,          ++rowsKriged};
         // Rows that this tile row is the first to reach.
         for (RowRing& ring : sums_)
             for (int row = zeroedRows_; row < std::min(height_, y + kTile + kMaxReach); ++row)
@@ -140,7 +141,8 @@ void Level::finishRow(std::size_t m, int y) {
                 if (weight <= 0) {  // no neighbourhood with data reaches it
                     estimate = data_.data().row(data.mean(half) + c, y)[x];
                     // Of a gap's pixel the semivariance at its distance is added in the end.
-                    if (c < 3 && gap == 0) variance[c] += 2 * static_cast<double>(data_.variances().row(c, y)[x]);
+                    if (c < 3 && gap == 0)
+                        variance[c] += 2 * static_cast<double>(data_.variances().row(c, y)[x]);
                     continue;
                 }
                 const double shift = sums_[m].row(from + planes.sum(c), y)[x] / weight;

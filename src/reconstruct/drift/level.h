@@ -5,9 +5,9 @@
 
 #include "reconstruct/common/pixel_statistics.h"
 #include "reconstruct/common/stage_clock.h"
+#include "reconstruct/data/level_data.h"
 #include "reconstruct/drift/combination.h"
 #include "reconstruct/drift/neighbourhoods.h"
-#include "reconstruct/data/level_data.h"
 #include "variolux/reconstruct/reconstruction.h"
 
 /// The picture at one resolution, from its data to the combination of its models: drift.h, 3 to 5.

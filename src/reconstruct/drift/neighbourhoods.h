@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "reconstruct/drift/patch_similarity.h"
 #include "reconstruct/data/pixel_data.h"
+#include "reconstruct/drift/patch_similarity.h"
 
 /// Kriging in overlapping neighbourhoods: the estimates of one tile's centres, added to the pixels they
 /// reach.

@@ -124,7 +124,9 @@ VLX_WIDE void sumLattice(const float* in, const int* columns, std::size_t column
         alignas(32) float sums[kSpanStride];
         for (int i = 0; i < kSpanStride; i += 8) {
             const float* const at = in + rows[j] * kSpanStride + i;
-            const auto row = [&](int r) { return load<Eight>(at + r * kSpanStride); };
+            const auto row = [&](int r) __attribute__((always_inline)) {
+                return load<Eight>(at + r * kSpanStride);
+            };
             store(sums + i, ((row(0) + row(1)) + (row(2) + row(3))) + ((row(4) + row(5)) + row(6)));
         }
         for (std::size_t i = 0; i < columnCount; ++i) {

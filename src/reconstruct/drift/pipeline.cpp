@@ -24,9 +24,9 @@ constexpr int kCorrectedRows = 88;  // and differences
 constexpr int kCleanRows = 56;      // of 32 that go out together, and the light around them
 constexpr int kFinishingRows = 72;  // and their sums
 
-// What a process holds besides its rows, rounded up from 135 and 4 MB measured on Debian 12: the libraries
-// that it maps, and each thread's tiles.
-constexpr std::uint64_t kProcessBytes = 150'000'000;
+// What a process holds besides its rows, rounded up from 12 and 4 MB measured on Debian 12: the libraries
+// that it maps, unless it holds more already, and what else it takes; and each thread's tiles.
+constexpr std::uint64_t kProcessBytes = 25'000'000, kFurtherBytes = 10'000'000;
 constexpr std::uint64_t kThreadBytes = 8'000'000;
 
 Window scaled(const Window& window, int scale) {
@@ -69,11 +69,10 @@ class FrameKriging::Stages {
           clean_(width_, CleanPlanes{radiance_}.channels(), kept(kCleanRows)),
           light_(width_, LightPlanes::kChannels, kept(kFinishingRows)),
           common_(width_, CommonErrorPlanes::kChannels, kept(kFinishingRows)),
-          finishing_(layout_, options, frame_.picture(), fine_.rows(), halved_ ? corrected_ : fine_.rows().combined,
-                     clean_, light_, common_) {
+          finishing_(layout_, options, frame_.picture(), fine_.rows(),
+                     halved_ ? corrected_ : fine_.rows().combined, clean_, light_, common_) {
         if (halved_) {
-            coarse_ =
-                std::make_unique<Level>(layout_, options, true, frame_.coarse(), drift_, clock_);
+            coarse_ = std::make_unique<Level>(layout_, options, true, frame_.coarse(), drift_, clock_);
             correction_ = std::make_unique<Correction>(radiance_, fine_.rows(), coarse_->rows(), differences_,
                                                        corrected_);
         }
@@ -103,6 +102,7 @@ class FrameKriging::Stages {
             drift_.energyRemoved = counts.removed / counts.luminance;
             drift_.energyReturned = returned_ / counts.luminance;
         }
+        drift_.light = 0;
         if (counts.light > 0) {
             drift_.light = imageLight_ / counts.light;
             // Of the samples as they came; where pixels have one sample, what their neighbours say of it.
@@ -216,7 +216,7 @@ class FrameKriging::Stages {
     int firstRow_ = 0, endRow_ = 0;  // of the band
     int differenceRows_ = 0, correctedRows_ = 0, cleanRows_ = 0, finishedRows_ = 0;
     double returned_ = 0, imageLight_ = 0, lightNoise_ = 0;  // Finishing::Counts
-    Image rows_;                                 // finished, on their way out
+    Image rows_;                                             // finished, on their way out
 };
 
 FrameKriging::FrameKriging(const SampleSource& dump, const Drift& options, Frame& frame,
@@ -270,7 +270,8 @@ ReconstructionReport reconstructDrift(const SampleSource& dump, const Drift& opt
     FrameKriging kriging(dump, options, samples.frame(), report, clock);
     requireMemory(dump.path(), kriging.ringBytes(), "rows as wide as these");
     if (options.maxMemory > 0)
-        samples.readWithin(options.maxMemory, kProcessBytes + kriging.ringBytes() +
+        samples.readWithin(options.maxMemory, std::max(kProcessBytes, residentMemory() + kFurtherBytes) +
+                                                  kriging.ringBytes() +
                                                   kThreadBytes * static_cast<std::uint64_t>(threadCount()));
     const Window own = driftOutline(dump, options).data;
     const int first = own.y - dump.header().data.y * options.scale;

@@ -74,8 +74,8 @@ void Merge::compareRow(int y) {
             for (int x = 0; x < width_; ++x) {
                 float* const place = places.data() + 2 * static_cast<std::size_t>(x);
                 const auto inside = [&] {
-                    return place[0] > -0.5f && place[0] < static_cast<float>(width_) - 0.5f && place[1] > -0.5f &&
-                           place[1] < static_cast<float>(height_) - 0.5f;
+                    return place[0] > -0.5f && place[0] < static_cast<float>(width_) - 0.5f &&
+                           place[1] > -0.5f && place[1] < static_cast<float>(height_) - 0.5f;
                 };
                 if (inside() && from->motion().channels() > 0) {
                     const auto col = static_cast<int>(std::lround(place[0])),
@@ -126,9 +126,10 @@ void Merge::compareRow(int y, const SampledFrame& there, const float* places, st
             const auto i = static_cast<std::size_t>(f);
             const float ratio = scale[i] / layout_.scale[i];
             const float d = a.features().row(f, y)[x] - rescaled(b.features().row(f, row)[col], ratio);
-            distance += d * d /
-                        (kFeatureWidth2 + 2 * (a.features().row(featurePlanes_.error(f), y)[x] +
-                                               ratio * ratio * b.features().row(featurePlanes_.error(f), row)[col]));
+            distance +=
+                d * d /
+                (kFeatureWidth2 + 2 * (a.features().row(featurePlanes_.error(f), y)[x] +
+                                       ratio * ratio * b.features().row(featurePlanes_.error(f), row)[col]));
         }
         out(ApartPlanes::kFeatures)[x] = distance;
     }
@@ -192,9 +193,10 @@ void Merge::mergeRow(int y, PixelRows& out) const {
             const PixelRows& rows = neighbour(k).frame().fine().pixels();
             if (rows.data.row(planes_.count(), row)[col] <= 0) continue;
             const std::size_t at = 2 * k * w + static_cast<std::size_t>(x);
-            data.push_back({&rows, &neighbour(k).frame().layout().scale, col, row, {weights[at], weights[at + w]}});
+            data.push_back(
+                {&rows, &neighbour(k).frame().layout().scale, col, row, {weights[at], weights[at + w]}});
         }
-        const auto value = [&](const Datum& of, RowRing PixelRows::* ring, int plane) {
+        const auto value = [&](const Datum& of, RowRing PixelRows::*ring, int plane) {
             return (of.rows->*ring).row(plane, of.y)[of.x];
         };
         float count = 0;
@@ -230,7 +232,8 @@ void Merge::mergeRow(int y, PixelRows& out) const {
         };
         for (int c = 0; c < 3; ++c) {
             float sum = 0;
-            for (const Datum& of : data) sum += weight(of) * value(of, &PixelRows::data, planes_.removed() + c);
+            for (const Datum& of : data)
+                sum += weight(of) * value(of, &PixelRows::data, planes_.removed() + c);
             out.data.row(planes_.removed() + c, y)[x] = sum;
         }
         for (int k = 0; k < SquaresPlanes::kChannels; ++k) {
