@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "reconstruct/drift/centre.h"
 #include "variolux/base/parallel.h"
@@ -11,21 +10,18 @@ namespace vlx {
 
 namespace {
 
-/// Of one neighbour: where a pixel's point is there, and how unlike the halves are.
+/// Of one neighbour: where a pixel's point is there, and how unlike it is.
 struct ApartPlanes {
-    static constexpr int kColumn = 0, kRow = 1;                     // -1: not in the picture
-    static constexpr int difference(int half) { return 2 + half; }  // in units of noise
+    static constexpr int kColumn = 0, kRow = 1;                     // kNowhere: not in the picture
+    static constexpr int difference(int half) { return 2 + half; }  // of the halves' means, in units of noise
     static constexpr int known(int half) { return 4 + half; }       // 1 where there is one
-    static constexpr int kFeatures = 6;                             // squared distance of the features
+    static constexpr int kUnlike = 6;                               // by features and motion
     static constexpr int kChannels = 7;
 };
 
-constexpr int kComparedRows = 80;  // those filled at a time, and patches around
-
-float environment(const char* name, float value) {
-    const char* text = std::getenv(name);
-    return text ? static_cast<float>(std::atof(text)) : value;
-}
+constexpr float kNowhere = -1;
+constexpr float kWildVariances = 9;  // three standard deviations: beyond it is an outlier, how far says nothing
+constexpr int kComparedRows = 80;    // those filled at a time, and patches around
 
 /// A feature in units of another scale: saturated() of what it was.
 float rescaled(float value, float ratio) {
@@ -35,14 +31,25 @@ float rescaled(float value, float ratio) {
     return saturated(std::copysign(linear * ratio, value));
 }
 
+bool isInside(float place, int size) { return place > -0.5f && place < static_cast<float>(size) - 0.5f; }
+
+float smoothstep(float t) { return t * t * (3 - 2 * t); }
+
 }  // namespace
 
-Merge::Merge(const SampledFrame& own, std::vector<const SampledFrame*> before,
-             std::vector<const SampledFrame*> after)
-    : own_(own),
+/// A pixel of a frame that adds to a datum. Planes lie `width` apart.
+struct Merge::Tap {
+    const float *data, *squares, *raw;
+    const std::vector<float>* scale;  // of its features
+    float part;                       // of the frame's
+    float weight[2];                  // of the halves, `part` in it
+};
+
+Merge::Merge(const SampledFrame& own, std::vector<Neighbour> before, std::vector<Neighbour> after)
+    : frame_(own),
       layout_(own.frame().layout()),
       planes_{layout_.radiance},
-      featurePlanes_{layout_.features},
+      features_{layout_.features},
       before_(std::move(before)),
       after_(std::move(after)),
       width_(own.frame().width()),
@@ -58,203 +65,252 @@ void Merge::fill(int first, int end, PixelRows& out) {
     apart_.claim(comparedRows_, compared);
     parallelFor(comparedRows_, compared, [&](std::int64_t y) { compareRow(static_cast<int>(y)); });
     comparedRows_ = compared;
-    parallelFor(first, end, [&](std::int64_t y) { mergeRow(static_cast<int>(y), out); });
+    std::vector<double> merged(static_cast<std::size_t>(end - first));
+    parallelFor(first, end, [&](std::int64_t y) {
+        merged[static_cast<std::size_t>(y - first)] = mergeRow(static_cast<int>(y), out);
+    });
+    for (int y = first; y < end; ++y) {
+        merged_ += merged[static_cast<std::size_t>(y - first)];
+        const float* const n = frame_.frame().fine().data().row(planes_.count(), y);
+        for (int x = 0; x < width_; ++x) own_ += static_cast<double>(n[x]);
+    }
 }
 
 void Merge::compareRow(int y) {
     std::vector<float> places(2 * static_cast<std::size_t>(width_));
     for (const auto* list : {&before_, &after_}) {
         const bool next = list == &after_;
-        for (int x = 0; x < width_; ++x) {
-            places[2 * static_cast<std::size_t>(x)] = static_cast<float>(x);
-            places[2 * static_cast<std::size_t>(x) + 1] = static_cast<float>(y);
+        for (std::size_t x = 0; x < places.size() / 2; ++x) {
+            places[2 * x] = static_cast<float>(x);
+            places[2 * x + 1] = static_cast<float>(y);
         }
-        const SampledFrame* from = &own_;
+        const SampledFrame* from = &frame_;
         for (std::size_t k = 0; k < list->size(); ++k) {
+            const SampledFrame* const to = (*list)[k].frame;
+            const std::size_t number = next ? before_.size() + k : k;
+            float* const unlike = apart_.row(
+                ApartPlanes::kChannels * static_cast<int>(number) + ApartPlanes::kUnlike, y);
+            std::fill_n(unlike, width_, 0.f);
+            // One frame farther: by the motion of what is there, without one as it lies.
+            const auto move = [&](const SampledFrame& of, bool forward, const float* place, float* step) {
+                step[0] = step[1] = 0;
+                if (of.motion().channels() == 0) return;
+                const auto col = static_cast<int>(std::lround(place[0])),
+                           row = static_cast<int>(std::lround(place[1]));
+                step[0] = of.motion().row(MotionPlanes::x(forward), row)[col];
+                step[1] = of.motion().row(MotionPlanes::y(forward), row)[col];
+            };
             for (int x = 0; x < width_; ++x) {
                 float* const place = places.data() + 2 * static_cast<std::size_t>(x);
-                const auto inside = [&] {
-                    return place[0] > -0.5f && place[0] < static_cast<float>(width_) - 0.5f &&
-                           place[1] > -0.5f && place[1] < static_cast<float>(height_) - 0.5f;
-                };
-                if (inside() && from->motion().channels() > 0) {
-                    const auto col = static_cast<int>(std::lround(place[0])),
-                               row = static_cast<int>(std::lround(place[1]));
-                    place[0] += from->motion().row(MotionPlanes::x(next), row)[col];
-                    place[1] += from->motion().row(MotionPlanes::y(next), row)[col];
+                if (place[0] == kNowhere) continue;
+                float there[2], back[2];
+                move(*from, next, place, there);
+                place[0] += there[0];
+                place[1] += there[1];
+                if (!isInside(place[0], width_) || !isInside(place[1], height_)) {
+                    place[0] = place[1] = kNowhere;
+                    continue;
                 }
-                if (!inside()) place[0] = place[1] = -1;
+                move(*to, !next, place, back);
+                const float apart[2] = {there[0] + back[0], there[1] + back[1]};
+                const float mismatch = apart[0] * apart[0] + apart[1] * apart[1];
+                if (mismatch > 0) unlike[x] = mismatch;
             }
-            compareRow(y, *(*list)[k], places.data(), next ? before_.size() + k : k);
-            from = (*list)[k];
+            compareRow(y, number, places);
+            from = to;
         }
     }
 }
 
-void Merge::compareRow(int y, const SampledFrame& there, const float* places, std::size_t k) {
-    const LevelData &a = own_.frame().fine(), &b = there.frame().fine();
-    const std::vector<float>& scale = there.frame().layout().scale;
+void Merge::compareRow(int y, std::size_t k, const std::vector<float>& places) {
+    const LevelData &own = frame_.frame().fine(), &other = neighbour(k).frame->frame().fine();
+    const std::vector<float>& scale = neighbour(k).frame->frame().layout().scale;
     const auto out = [&](int plane) {
         return apart_.row(ApartPlanes::kChannels * static_cast<int>(k) + plane, y);
     };
-    for (int plane = 0; plane < ApartPlanes::kChannels; ++plane) std::fill_n(out(plane), width_, 0.f);
+    for (int half = 0; half < 2; ++half) {
+        std::fill_n(out(ApartPlanes::difference(half)), width_, 0.f);
+        std::fill_n(out(ApartPlanes::known(half)), width_, 0.f);
+    }
+    const auto w = static_cast<std::size_t>(width_);
+    const auto at = [&](const RowRing& ring, int row, int col) { return ring.row(0, row) + col; };
+    const auto plane = [&](int p) { return static_cast<std::size_t>(p) * w; };
     for (int x = 0; x < width_; ++x) {
-        const auto col = static_cast<int>(std::lround(places[2 * x])),
-                   row = static_cast<int>(std::lround(places[2 * x + 1]));
-        out(ApartPlanes::kColumn)[x] = static_cast<float>(col);
-        out(ApartPlanes::kRow)[x] = static_cast<float>(row);
-        if (col < 0) continue;
+        const float* const place = places.data() + 2 * static_cast<std::size_t>(x);
+        out(ApartPlanes::kColumn)[x] = place[0];
+        out(ApartPlanes::kRow)[x] = place[1];
+        if (place[0] == kNowhere) continue;
+        const auto col = static_cast<int>(std::lround(place[0])), row = static_cast<int>(std::lround(place[1]));
+        if (neighbour(k).sameSeed && col == x && row == y) {
+            out(ApartPlanes::kColumn)[x] = kNowhere;
+            continue;
+        }
+        const float *const a = at(own.data(), y, x), *const b = at(other.data(), row, col);
+        const float *const va = at(own.variances(), y, x), *const vb = at(other.variances(), row, col);
         for (int half = 0; half < 2; ++half) {
-            const float n = a.data().row(planes_.halfCount(half), y)[x],
-                        m = b.data().row(planes_.halfCount(half), row)[col];
+            const float n = a[plane(planes_.halfCount(half))], m = b[plane(planes_.halfCount(half))];
             if (n <= 0 || m <= 0) continue;
             float squares = 0, noise = 0, sum = 0;
             for (int c = 0; c < 3; ++c) {
-                const float z = a.data().row(planes_.mean(half) + c, y)[x],
-                            t = b.data().row(planes_.mean(half) + c, row)[col];
-                const float v = a.variances().row(c, y)[x] / std::max(1.f, n) +
-                                b.variances().row(c, row)[col] / std::max(1.f, m);
+                const float z = a[plane(planes_.mean(half) + c)], t = b[plane(planes_.mean(half) + c)];
+                const float v = va[plane(c)] / std::max(1.f, n) + vb[plane(c)] / std::max(1.f, m);
                 squares += (z - t) * (z - t);
                 noise += v;
                 sum += kLeastSquare + 1e-6f * (z * z + t * t) + v;
             }
-            out(ApartPlanes::difference(half))[x] = (squares - noise) / sum;
+            out(ApartPlanes::difference(half))[x] = std::min(kWildVariances, (squares - noise) / sum);
             out(ApartPlanes::known(half))[x] = 1;
         }
+        const float *const fa = at(own.features(), y, x), *const fb = at(other.features(), row, col);
         float distance = 0;
         for (int f = 0; f < layout_.features; ++f) {
             const auto i = static_cast<std::size_t>(f);
             const float ratio = scale[i] / layout_.scale[i];
-            const float d = a.features().row(f, y)[x] - rescaled(b.features().row(f, row)[col], ratio);
-            distance +=
-                d * d /
-                (kFeatureWidth2 + 2 * (a.features().row(featurePlanes_.error(f), y)[x] +
-                                       ratio * ratio * b.features().row(featurePlanes_.error(f), row)[col]));
+            const float d = fa[plane(f)] - rescaled(fb[plane(f)], ratio);
+            const float u =
+                fa[plane(features_.error(f))] + ratio * ratio * fb[plane(features_.error(f))];
+            distance += (d * d - u) / (kFeatureWidth2 + 2 * u);
         }
-        out(ApartPlanes::kFeatures)[x] = distance;
+        out(ApartPlanes::kUnlike)[x] += std::max(0.f, distance);
     }
 }
 
-/// Of each neighbour and half, for the pixels of a row.
+/// Of each neighbour and half, row by row of pixels.
 std::vector<float> Merge::weightsOf(int y) const {
-    static const float sharp = environment("VLX_SHARP", 2), features = environment("VLX_FEATURES", 0.3f);
     const auto w = static_cast<std::size_t>(width_);
-    std::vector<float> weights(2 * neighbours() * w), columns(2 * w);
-    for (std::size_t k = 0; k < neighbours(); ++k) {
-        const int first = ApartPlanes::kChannels * static_cast<int>(k);
+    std::vector<float> weights(2 * neighbours() * w), sums(w), counts(w);
+    for (std::size_t k = 0; k < neighbours(); ++k)
         for (int half = 0; half < 2; ++half) {
-            std::fill(columns.begin(), columns.end(), 0.f);
+            const int first = ApartPlanes::kChannels * static_cast<int>(k);
+            sums.assign(w, 0.f);
+            counts.assign(w, 0.f);
             for (int row = std::max(0, y - kPatchRadius); row <= std::min(height_ - 1, y + kPatchRadius);
                  ++row) {
                 const float* const d = apart_.row(first + ApartPlanes::difference(half), row);
                 const float* const n = apart_.row(first + ApartPlanes::known(half), row);
                 for (std::size_t x = 0; x < w; ++x) {
-                    columns[x] += d[x];
-                    columns[w + x] += n[x];
+                    sums[x] += d[x];
+                    counts[x] += n[x];
                 }
             }
             const float* const column = apart_.row(first + ApartPlanes::kColumn, y);
-            const float* const unlike = apart_.row(first + ApartPlanes::kFeatures, y);
+            const float* const unlike = apart_.row(first + ApartPlanes::kUnlike, y);
+            float* const out = weights.data() + (2 * k + static_cast<std::size_t>(1 - half)) * w;
             for (int x = 0; x < width_; ++x) {
                 float sum = 0, count = 0;
                 for (int i = std::max(0, x - kPatchRadius); i <= std::min(width_ - 1, x + kPatchRadius);
                      ++i) {
-                    sum += columns[static_cast<std::size_t>(i)];
-                    count += columns[w + static_cast<std::size_t>(i)];
+                    sum += sums[static_cast<std::size_t>(i)];
+                    count += counts[static_cast<std::size_t>(i)];
                 }
                 const float d = count > 0 ? std::max(0.f, sum / count) : 0;
-                // The other half's weight: independent of what it weighs.
-                weights[(2 * k + static_cast<std::size_t>(1 - half)) * w + static_cast<std::size_t>(x)] =
-                    column[x] < 0 ? 0 : std::exp(-features * unlike[x]) / (1 + sharp * d);
+                out[x] = column[x] == kNowhere ? 0 : std::exp(-d - unlike[x]);
             }
         }
-    }
     return weights;
 }
 
-void Merge::mergeRow(int y, PixelRows& out) const {
-    const auto w = static_cast<std::size_t>(width_);
+/// The four pixels around the place of (x, y) in neighbour k.
+void Merge::addTaps(int x, int y, std::size_t k, const std::vector<float>& weights,
+                    std::vector<Tap>& taps) const {
+    const int first = ApartPlanes::kChannels * static_cast<int>(k);
+    const float column = apart_.row(first + ApartPlanes::kColumn, y)[x],
+                row = apart_.row(first + ApartPlanes::kRow, y)[x];
+    const std::size_t at = 2 * k * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+    const float weight[2] = {weights[at], weights[at + static_cast<std::size_t>(width_)]};
+    if (column == kNowhere || (weight[0] <= 0 && weight[1] <= 0)) return;
+    const Frame& frame = neighbour(k).frame->frame();
+    const PixelRows& of = frame.fine().pixels();
+    const float left = std::floor(column), top = std::floor(row);
+    const float beyond[2] = {smoothstep(column - left), smoothstep(row - top)};
+    for (int j = 0; j < 4; ++j) {
+        const float part = (j % 2 == 0 ? 1 - beyond[0] : beyond[0]) * (j / 2 == 0 ? 1 - beyond[1] : beyond[1]);
+        if (part <= 0) continue;
+        const int c = std::clamp(static_cast<int>(left) + j % 2, 0, width_ - 1),
+                  r = std::clamp(static_cast<int>(top) + j / 2, 0, height_ - 1);
+        if (of.data.row(planes_.count(), r)[c] <= 0) continue;
+        taps.push_back({of.data.row(0, r) + c, of.squares.row(0, r) + c,
+                        layout_.features > 0 ? of.raw.row(0, r) + c : nullptr, &frame.layout().scale, part,
+                        {part * weight[0], part * weight[1]}});
+    }
+}
+
+/// The sum of effective counts.
+double Merge::mergeRow(int y, PixelRows& out) const {
     const std::vector<float> weights = weightsOf(y);
-    const LevelData& own = own_.frame().fine();
-    struct Datum {
-        const PixelRows* rows;
-        const std::vector<float>* scale;
-        int x, y;
-        float weight[2];
-    };
-    std::vector<Datum> data;
+    const PixelRows& own = frame_.frame().fine().pixels();
+    const auto plane = [&](int p) { return static_cast<std::size_t>(p) * static_cast<std::size_t>(width_); };
+    double merged = 0;
+    std::vector<Tap> taps;
     for (int x = 0; x < width_; ++x) {
-        data.assign(1, {&own.pixels(), &layout_.scale, x, y, {1, 1}});
-        for (std::size_t k = 0; k < neighbours(); ++k) {
-            const int first = ApartPlanes::kChannels * static_cast<int>(k);
-            const auto col = static_cast<int>(apart_.row(first + ApartPlanes::kColumn, y)[x]),
-                       row = static_cast<int>(apart_.row(first + ApartPlanes::kRow, y)[x]);
-            if (col < 0) continue;
-            const PixelRows& rows = neighbour(k).frame().fine().pixels();
-            if (rows.data.row(planes_.count(), row)[col] <= 0) continue;
-            const std::size_t at = 2 * k * w + static_cast<std::size_t>(x);
-            data.push_back(
-                {&rows, &neighbour(k).frame().layout().scale, col, row, {weights[at], weights[at + w]}});
+        taps.assign(1, {own.data.row(0, y) + x, own.squares.row(0, y) + x,
+                        layout_.features > 0 ? own.raw.row(0, y) + x : nullptr, &layout_.scale, 1, {1, 1}});
+        for (std::size_t k = 0; k < neighbours(); ++k) addTaps(x, y, k, weights, taps);
+        float* const to = out.data.row(0, y) + x;
+        if (taps.size() == 1) {  // as they came, bit for bit
+            for (int p = 0; p < planes_.channels(); ++p) to[plane(p)] = taps[0].data[plane(p)];
+            for (int p = 0; p < SquaresPlanes::kChannels; ++p)
+                out.squares.row(p, y)[x] = taps[0].squares[plane(p)];
+            for (int p = 0; p < features_.rawChannels(); ++p) out.raw.row(p, y)[x] = taps[0].raw[plane(p)];
+            merged += static_cast<double>(to[plane(planes_.count())]);
+            continue;
         }
-        const auto value = [&](const Datum& of, RowRing PixelRows::*ring, int plane) {
-            return (of.rows->*ring).row(plane, of.y)[of.x];
-        };
         float count = 0;
         for (int half = 0; half < 2; ++half) {
             float total = 0, squares = 0;
-            for (const Datum& of : data) {
-                const float n = value(of, &PixelRows::data, planes_.halfCount(half));
+            for (const Tap& of : taps) {
+                const float n = of.data[plane(planes_.halfCount(half))];
                 total += of.weight[half] * n;
-                squares += of.weight[half] * of.weight[half] * n;
+                squares += of.weight[half] * of.weight[half] / of.part * n;
             }
             for (int c = 0; c < layout_.radiance; ++c) {
+                const std::size_t p = plane(planes_.mean(half) + c);
                 float sum = 0;
-                for (const Datum& of : data)
-                    sum += of.weight[half] * value(of, &PixelRows::data, planes_.halfCount(half)) *
-                           value(of, &PixelRows::data, planes_.mean(half) + c);
-                out.data.row(planes_.mean(half) + c, y)[x] =
-                    total > 0 ? sum / total : value(data[0], &PixelRows::data, planes_.mean(half) + c);
+                for (const Tap& of : taps)
+                    sum += of.weight[half] * of.data[plane(planes_.halfCount(half))] * of.data[p];
+                to[p] = total > 0 ? sum / total : taps[0].data[p];
             }
-            const float samples = total > 0 ? total * total / squares : 0;
-            out.data.row(planes_.halfCount(half), y)[x] = samples;
-            count += samples;
+            const float n = total > 0 ? total * total / squares : 0;
+            to[plane(planes_.halfCount(half))] = n;
+            count += n;
         }
-        out.data.row(planes_.count(), y)[x] = count;
-        out.data.row(planes_.stated(), y)[x] = value(data[0], &PixelRows::data, planes_.stated());
-        out.data.row(planes_.gap(), y)[x] = count > 0 ? 0 : value(data[0], &PixelRows::data, planes_.gap());
+        to[plane(planes_.count())] = count;
+        to[plane(planes_.stated())] = taps[0].data[plane(planes_.stated())];
+        to[plane(planes_.gap())] = count > 0 ? 0 : taps[0].data[plane(planes_.gap())];
         // What both halves have in common.
-        const auto share = [&](const Datum& of) { return (of.weight[0] + of.weight[1]) / 2; };
+        const auto share = [](const Tap& of) { return (of.weight[0] + of.weight[1]) / 2; };
         float total = 0;
-        for (const Datum& of : data) total += share(of) * value(of, &PixelRows::data, planes_.count());
-        const auto weight = [&](const Datum& of) {
-            return total > 0 ? share(of) * value(of, &PixelRows::data, planes_.count()) / total
-                             : static_cast<float>(&of == data.data());
+        for (const Tap& of : taps) total += share(of) * of.data[plane(planes_.count())];
+        const auto part = [&](const Tap& of) {
+            return total > 0 ? share(of) * of.data[plane(planes_.count())] / total
+                             : static_cast<float>(&of == taps.data());
         };
         for (int c = 0; c < 3; ++c) {
-            float sum = 0;
-            for (const Datum& of : data)
-                sum += weight(of) * value(of, &PixelRows::data, planes_.removed() + c);
-            out.data.row(planes_.removed() + c, y)[x] = sum;
+            const std::size_t p = plane(planes_.removed() + c);
+            to[p] = 0;
+            for (const Tap& of : taps) to[p] += part(of) * of.data[p];
         }
-        for (int k = 0; k < SquaresPlanes::kChannels; ++k) {
+        for (int p = 0; p < SquaresPlanes::kChannels; ++p) {
             float sum = 0;
-            for (const Datum& of : data) sum += share(of) * value(of, &PixelRows::squares, k);
-            out.squares.row(k, y)[x] = sum;
+            for (const Tap& of : taps) sum += share(of) * of.squares[plane(p)];
+            out.squares.row(p, y)[x] = sum;
         }
         for (int f = 0; f < layout_.features; ++f) {
             float mean = 0, error = 0, difference = 0;
-            for (const Datum& of : data) {
+            for (const Tap& of : taps) {
                 const auto i = static_cast<std::size_t>(f);
-                const float ratio = (*of.scale)[i] / layout_.scale[i], part = weight(of);
-                mean += part * rescaled(value(of, &PixelRows::raw, featurePlanes_.value(f)), ratio);
-                error += part * part * ratio * ratio * value(of, &PixelRows::raw, featurePlanes_.error(f));
-                difference += part * ratio * value(of, &PixelRows::raw, featurePlanes_.difference(f));
+                const float ratio = (*of.scale)[i] / layout_.scale[i], p = part(of);
+                mean += p * rescaled(of.raw[plane(features_.value(f))], ratio);
+                error += p * p / of.part * ratio * ratio * of.raw[plane(features_.error(f))];
+                difference += p * ratio * of.raw[plane(features_.difference(f))];
             }
-            out.raw.row(featurePlanes_.value(f), y)[x] = mean;
-            out.raw.row(featurePlanes_.error(f), y)[x] = error;
-            out.raw.row(featurePlanes_.difference(f), y)[x] = difference;
+            out.raw.row(features_.value(f), y)[x] = mean;
+            out.raw.row(features_.error(f), y)[x] = error;
+            out.raw.row(features_.difference(f), y)[x] = difference;
         }
+        merged += static_cast<double>(count);
     }
+    return merged;
 }
 
 }  // namespace vlx

@@ -45,12 +45,12 @@ struct Sequence::Impl {
         return at->second.get();
     }
     /// Frames beside `frame`, the nearest first, up to one that is not there.
-    std::vector<const SampledFrame*> beside(int frame, int step) {
-        std::vector<const SampledFrame*> found;
+    std::vector<Neighbour> beside(int frame, int step) {
+        std::vector<Neighbour> found;
         for (int k = 1; k <= options.temporal; ++k) {
             LoadedFrame* const there = load(frame + step * k);
             if (!there) break;
-            found.push_back(&there->samples);
+            found.push_back({&there->samples});
         }
         return found;
     }
