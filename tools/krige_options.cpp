@@ -13,8 +13,8 @@ namespace {
 const std::vector<OptionUse>& usesByMethod() {
     static const std::vector<OptionUse> uses = {
         {{"--quality", "--fireflies", "--strength", "--feature", "--radiance", "--scale", "--filter",
-          "--band", "--no-features", "--without", "--max-memory", "--denoised", "--denoised-halves",
-          "--denoiser", "--assess", "--assess-halves"},
+          "--band", "--temporal", "--no-features", "--without", "--max-memory", "--denoised",
+          "--denoised-halves", "--denoiser", "--assess", "--assess-halves"},
          {"--method krige"}},
         {{"--clamp"}, {"--fireflies clamp"}},
         {{"--sampling-map"}, {"--method krige", "--method paper", "--method mean"}},
@@ -174,6 +174,14 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
            "Krige these frames, for example 1-100x2,150: #### in the names of files stands for the frame's "
            "number. When a frame fails the others go on")
         ->option_text("LIST");
+    app.add_option("--temporal", o.krige.temporal,
+                   "krige: with --frames: data of as many frames before and after, as far as there are such "
+                   "files (within --frames or not), add to each frame, moved by the dumps' motion vectors, "
+                   "or as they lie where there are none. What was hidden or has changed loses its weight. "
+                   "Pixels do not depend on how frames are shared out to processes")
+        ->check(CLI::Range(0, kMostTemporal))
+        ->option_text("N")
+        ->capture_default_str();
     addOverwrite(app, o.overwrite);
     app.add_option(
            "--max-memory", o.maxMemory,
@@ -191,7 +199,7 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
         "  vlx-krige beauty.exr -o denoised.exr --radiance key --radiance fill\n"
         "  vlx-krige samples.exr -o denoised.exr --template beauty.exr\n"
         "  vlx-krige samples.exr -o blurred.exr --method gaussian --sigma 1.5\n"
-        "  vlx-krige room_####.exr -o kriged_####.exr --frames 1-100\n"
+        "  vlx-krige room_####.exr -o kriged_####.exr --frames 1-100 --temporal 2\n"
         "Samples that are not finite are left out and counted. Regions that cannot be kriged\n"
         "get their mean and are counted.");
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,6 +28,7 @@
 #include "variolux/reconstruct/pixel_filter.h"
 #include "variolux/reconstruct/reconstruct.h"
 #include "variolux/reconstruct/sampling_map.h"
+#include "variolux/reconstruct/sequence.h"
 
 namespace {
 
@@ -126,11 +129,77 @@ void assessed(const vlx::KrigeOptions& o, const vlx::SampleSource& samples, cons
     printAssessment(o);
 }
 
-void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
+// A sequence whose frames add to each other.
+class Shot {
+  public:
+    explicit Shot(const vlx::KrigeOptions& o)
+        : options_(o), sequence_([this](int frame) { return open(frame); }, o.krige) {}
+
+    // The options of one frame.
+    vlx::KrigeOptions frame(int number) const {
+        vlx::KrigeOptions one = options_;
+        std::vector<std::string*> names = one.moments.fileNames();
+        names.insert(names.end(), {&one.input, &one.image, &one.samplingMap, &one.layersOf});
+        for (std::string* name : names) *name = vlx::frameName(*name, number);
+        one.opinion = options_.opinion.ofFrame(number);
+        return one;
+    }
+    // What the result depends on besides the frame's own files. Frames that have become others are forgotten.
+    std::vector<std::string> filesAround(int number) {
+        std::vector<std::string> files;
+        for (const int step : {-1, 1})
+            for (int k = 1; k <= options_.krige.temporal; ++k) {
+                const vlx::KrigeOptions one = frame(number + step * k);
+                if (number + step * k < 0 || !std::filesystem::exists(one.input)) break;
+                files.push_back(one.input);
+                for (const std::string& file : one.moments.files()) files.push_back(file);
+            }
+        for (auto at = read_.begin(); at != read_.end();)
+            if (at->second != identity(at->first)) {
+                sequence_.forget(at->first);
+                at = read_.erase(at);
+            } else {
+                ++at;
+            }
+        return files;
+    }
+    vlx::Sequence& sequence() { return sequence_; }
+
+  private:
+    struct Opened : vlx::PositionedSamples {
+        Opened(std::unique_ptr<vlx::SampleSource> samples, vlx::PositionConvention convention, bool used)
+            : vlx::PositionedSamples(*samples, convention, used), source(std::move(samples)) {}
+        std::unique_ptr<vlx::SampleSource> source;
+    };
+
+    std::unique_ptr<vlx::SampleSource> open(int number) {
+        const vlx::KrigeOptions one = frame(number);
+        if (!std::filesystem::exists(one.input)) return nullptr;
+        read_[number] = identity(number);
+        return std::make_unique<Opened>(openInput(one, vlx::isFlatImage(one.input)), one.positions,
+                                        one.krige.scale > 1);
+    }
+    std::pair<std::uintmax_t, std::filesystem::file_time_type> identity(int number) const {
+        std::error_code none;
+        const std::string name = frame(number).input;
+        return {std::filesystem::file_size(name, none), std::filesystem::last_write_time(name, none)};
+    }
+
+    const vlx::KrigeOptions& options_;
+    std::map<int, std::pair<std::uintmax_t, std::filesystem::file_time_type>> read_;
+    vlx::Sequence sequence_;
+};
+
+// `shot`: where `number` is a frame of one; else null.
+void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress, Shot* shot = nullptr, int number = 0) {
     std::vector<std::string> files = o.moments.files();
     files.insert(files.end(), {o.input, o.layersOf});
     const std::vector<std::string> opinions = o.opinion.files();
     files.insert(files.end(), opinions.begin(), opinions.end());
+    if (shot) {
+        const std::vector<std::string> around = shot->filesAround(number);
+        files.insert(files.end(), around.begin(), around.end());
+    }
     vlx::checkOutputName(o.image, files);
     const std::string diagnosticsName = o.diagnostics ? o.image + ".json" : "";
     vlx::checkOutputs(
@@ -187,12 +256,14 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress) {
     if (original.empty() && !o.diagnostics && o.filter == vlx::PixelFilter::Box && o.samplingMap.empty()) {
         const vlx::Image outline = vlx::outline(dump, method);
         vlx::ImageWriter writer(o.image, outline.data, outline.display, outline.channels, write);
-        report = vlx::reconstruct(
-            dump, method, [&](const float* rows, int count) { writer.write(rows, count); }, progress);
+        const auto sink = [&](const float* rows, int count) { writer.write(rows, count); };
+        report = shot ? shot->sequence().reconstruct(number, sink, progress)
+                      : vlx::reconstruct(dump, method, sink, progress);
         made.checkUnchanged();
         writer.close();
     } else {
-        vlx::Reconstruction result = vlx::reconstruct(dump, method, progress);
+        vlx::Reconstruction result =
+            shot ? shot->sequence().reconstruct(number, progress) : vlx::reconstruct(dump, method, progress);
         result.image = vlx::applyPixelFilter(result.image, o.filter);
         made.checkUnchanged();
         const vlx::Image map = o.samplingMap.empty() ? vlx::Image() : vlx::samplingMap(result.image);
@@ -255,6 +326,11 @@ int run(vlx::KrigeOptions& o) {
     }
     const vlx::ThreadLimit limit(o.threads);
     vlx::ProgressBar bar("kriging");
+    if (o.krige.temporal > 0 && o.frames.empty())
+        throw CLI::ValidationError("--temporal goes with --frames: frames add to each other");
+    if (o.krige.temporal > 0 && (o.opinion.any() || o.diagnostics))
+        throw CLI::ValidationError(
+            "--temporal goes without --denoised, --denoiser, --assess and --diagnostics");
     if (o.frames.empty()) {
         kriged(o, bar);
         return vlx::kDone;
@@ -262,13 +338,9 @@ int run(vlx::KrigeOptions& o) {
     vlx::requireFramePlace("INPUT", o.input);
     vlx::requireFramePlace("--output", o.image);
     if (!o.samplingMap.empty()) vlx::requireFramePlace("--sampling-map", o.samplingMap);
+    Shot shot(o);
     vlx::forEachFrame(vlx::parseFrames(o.frames), bar, [&](int frame, const vlx::Progress& progress) {
-        vlx::KrigeOptions one = o;
-        std::vector<std::string*> names = one.moments.fileNames();
-        names.insert(names.end(), {&one.input, &one.image, &one.samplingMap, &one.layersOf});
-        for (std::string* name : names) *name = vlx::frameName(*name, frame);
-        one.opinion = o.opinion.ofFrame(frame);
-        kriged(one, progress);
+        kriged(shot.frame(frame), progress, o.krige.temporal > 0 ? &shot : nullptr, frame);
     });
     return vlx::kDone;
 }

@@ -11,9 +11,8 @@
 
 namespace vlx {
 
-namespace {
-
-Reconstruction whole(const SampleSource& source, const Image& outline, const auto& rowsOf) {
+Reconstruction wholeOf(const SampleSource& source, const Image& outline,
+                       const std::function<ReconstructionReport(const RowSink&)>& rowsOf) {
     requireMemory(source.path(), imageBytes(outline.data, outline.channels.size()), "an image held whole");
     Reconstruction result;
     result.image = Image(outline.data, outline.channels);
@@ -27,10 +26,12 @@ Reconstruction whole(const SampleSource& source, const Image& outline, const aut
     return result;
 }
 
+namespace {
+
 ReconstructionReport reconstructGaussian(const SampleSource& source, const Gaussian& method,
                                          const RowSink& sink, const Progress& progress) {
     const Mean mean{.empty = std::numeric_limits<float>::quiet_NaN()};  // a hole to the filter
-    const Reconstruction average = whole(source, outline(source, mean), [&](const RowSink& keep) {
+    const Reconstruction average = wholeOf(source, outline(source, mean), [&](const RowSink& keep) {
         return reconstructMean(source, mean, keep, progress);
     });
     const Image filtered = gaussianFilter(average.image.select({"R", "G", "B"}), method.sigma).image;
@@ -85,8 +86,8 @@ ReconstructionReport reconstruct(const SampleSource& source, const Method& metho
 }
 
 Reconstruction reconstruct(const SampleSource& source, const Method& method, const Progress& progress) {
-    return whole(source, outline(source, method),
-                 [&](const RowSink& keep) { return reconstruct(source, method, keep, progress); });
+    return wholeOf(source, outline(source, method),
+                   [&](const RowSink& keep) { return reconstruct(source, method, keep, progress); });
 }
 
 }  // namespace vlx

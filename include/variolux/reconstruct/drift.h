@@ -73,6 +73,9 @@
 /// too, so that dividing by it leaves no halos; it is kept within 0 to 1.
 namespace vlx {
 
+/// Frames on either side that add to one of a Sequence, at most.
+inline constexpr int kMostTemporal = 8;
+
 /// What is given up for speed: models used, and how densely neighbourhoods overlap.
 enum class Quality {
     Draft,     ///< the medium model, a neighbourhood every 8 pixels; features averaged over 7 x 7
@@ -123,7 +126,7 @@ struct Drift {
     /// (DriftReport::inspections), with `diagnostics`.
     std::vector<std::pair<int, int>> inspect = {};
 
-    int temporal = 0;  ///< frames before and after that add to a frame of a sequence (sequence.h)
+    int temporal = 0;  ///< 0 to kMostTemporal: frames before and after that add to one of a Sequence
     int scale = 1;     ///< 1 to 4: pixels of the image along each axis for one of the dump
     DriftSteps steps = {};
     Band band = {};  ///< only these rows: the pixels that they have in the whole image, bit for bit

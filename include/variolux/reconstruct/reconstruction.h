@@ -90,6 +90,9 @@ struct DriftReport {
     std::int64_t driftFeatures = 0;         ///< sum over neighbourhoods of the features that vary there; the
                                             ///< others are no drift
     double driftFunctions = 0;              ///< sum over neighbourhoods of the effective number of functions
+    int frames = 0;                         ///< of a sequence, besides the frame's own, that add to it
+    double framesGain = 1;  ///< what they make of the number of samples: times as many, on average
+    int equalSeeds = 0;     ///< of `frames`: they sampled with the seed of this one
     std::optional<SecondOpinionReport> secondOpinion;  ///< where there was one
     std::map<std::string, double> seconds;             ///< wall time by stage
     std::vector<ResidualRegion> residuals;             ///< row by row; where asked for (Drift::diagnostics)

@@ -5,24 +5,30 @@
 
 #include "variolux/reconstruct/reconstruct.h"
 
-/// Frames of a sequence, kriged with data of the frames around them.
+/// Frames of a sequence, kriged with data of the frames around them: drift.h, 10.
 namespace vlx {
 
+/// Holds what the samples of a window of frames say, each whole: about 50 floats a pixel of each with albedo,
+/// normal and depth.
 class Sequence {
   public:
-    /// The samples of a frame; null where there is no such frame.
+    /// The samples of a frame; null where there is no such frame. May throw Error.
     using Open = std::function<std::unique_ptr<SampleSource>(int frame)>;
 
-    /// Drift::temporal frames before and after a frame, as far as there are some, add to it.
+    /// Drift::temporal frames before and after a frame, up to the first that is not there, add to it.
     Sequence(Open open, const Drift& options);
     ~Sequence();
     Sequence(const Sequence&) = delete;
     Sequence& operator=(const Sequence&) = delete;
 
-    /// The picture of a frame without its pixels, as outline().
-    Image outline(int frame);
-    /// Each frame is read once where frames follow each other; the same pixels in any order.
+    /// As reconstruct() of that frame: the same pixels whatever frames were asked for before. Where they are
+    /// asked for in order each is read once. Throws Error as it, where there is no such frame, and where one
+    /// of those around is of another size or has other channels.
     ReconstructionReport reconstruct(int frame, const RowSink& sink, const Progress& progress = {});
+    Reconstruction reconstruct(int frame, const Progress& progress = {});
+
+    /// Has the frame read anew: it is another one now.
+    void forget(int frame);
 
   private:
     struct Impl;

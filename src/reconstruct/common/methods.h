@@ -12,6 +12,10 @@ inline constexpr const char* kStddevChannels[] = {"stddev.R", "stddev.G", "stdde
 void requireInside(const std::vector<std::pair<int, int>>& pixels, const Window& window,
                    const std::string& path);
 
+/// What rowsOf(sink) gives to its sink, held whole. Throws Error when there is not the memory.
+Reconstruction wholeOf(const SampleSource& source, const Image& outline,
+                       const std::function<ReconstructionReport(const RowSink&)>& rowsOf);
+
 Image driftOutline(const SampleSource& source, const Drift& method);
 
 ReconstructionReport reconstructDrift(const SampleSource& source, const Drift& method, const RowSink& sink,

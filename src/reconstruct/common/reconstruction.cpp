@@ -41,6 +41,9 @@ nlohmann::ordered_json json(const DriftReport& report) {
         {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
         {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
         {"seconds", report.seconds}};
+    if (report.frames > 0)
+        document["sequence"] = {
+            {"frames", report.frames}, {"gain", report.framesGain}, {"equalSeeds", report.equalSeeds}};
     if (const auto& of = report.secondOpinion)
         document["secondOpinion"] = {{"validated", of->validated},
                                      {"refused", of->refused},
@@ -190,6 +193,13 @@ std::string inWords(const DriftReport& report) {
          << std::round(100 * perNeighbourhood(report, report.driftFunctions)) / 100
          << " drift functions on average, "
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
+    if (report.frames > 0)
+        text << report.frames << " frames around count as " << std::round(100 * (report.framesGain - 1)) / 100
+             << " times the frame's own samples\n";
+    if (report.equalSeeds > 0)
+        text << "WARNING: " << report.equalSeeds
+             << " of them have the same seed: their noise is the same where nothing moves, and counts for "
+                "nothing there; render every frame with a seed of its own\n";
     if (const auto& of = report.secondOpinion)
         text << "the kriging weighs " << 100 * of->weight << " %, the other image the rest ("
              << (of->validated         ? "validated on samples that neither had seen"

@@ -22,13 +22,13 @@ class SampledFrame : private PixelSource {
     void readWithin(std::uint64_t most, std::uint64_t held);
     /// Counts rows from `first` up to `end` only.
     void own(int first, int end);
+    bool isOwn(int y) const { return y >= firstRow_ && y < endRow_; }
 
   private:
     void startAbove(int first) override;
     void fill(int first, int end, PixelRows& out) override;
     const FrameCounts& counts() const override { return counts_; }
     std::uint64_t ringBytes() const override { return gathered_.bytes() + motion_.bytes(); }
-    bool isOwn(int y) const { return y >= firstRow_ && y < endRow_; }
     void gather(int until);
 
     const SampleSource& dump_;

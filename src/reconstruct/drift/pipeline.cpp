@@ -234,6 +234,12 @@ std::optional<std::string> Drift::validate() const {
         return "expected a strength of 0 to 1, found " + std::to_string(strength);
     if (secondOpinion && (scale != 1 || strength != 1 || !radiance.empty()))
         return "expected no scale, strength or radiance with another denoiser's image, which has none";
+    if (temporal < 0 || temporal > kMostTemporal)
+        return "expected 0 to " + std::to_string(kMostTemporal) + " frames on either side, found " +
+               std::to_string(temporal);
+    if (temporal > 0 && secondOpinion)
+        return "expected no other denoiser's image with frames of a sequence, which its errors were not of";
+    if (temporal > 0 && diagnostics) return "expected no diagnostics with frames of a sequence";
     if (scale < 1 || scale > 4) return "expected a scale of 1 to 4, found " + std::to_string(scale);
     if (band.count < 1 || band.index < 0 || band.index >= band.count)
         return "expected a band from 1 to " + std::to_string(band.count) + ", found " +
@@ -264,6 +270,7 @@ Image driftOutline(const SampleSource& dump, const Drift& options) {
 
 ReconstructionReport reconstructDrift(const SampleSource& dump, const Drift& options, const RowSink& sink,
                                       const Progress& progress) {
+    if (options.temporal > 0) throw Error(dump.path(), "expected a Sequence for frames around this one");
     ReconstructionReport report;
     StageClock clock(report.method.emplace<DriftReport>().seconds);
     SampledFrame samples(dump, options, Kept::Rows, clock);

@@ -20,8 +20,9 @@ struct ApartPlanes {
 };
 
 constexpr float kNowhere = -1;
-constexpr float kWildVariances = 9;  // three standard deviations: beyond it is an outlier, how far says nothing
-constexpr int kComparedRows = 80;    // those filled at a time, and patches around
+constexpr float kWildVariances =
+    9;                             // three standard deviations: beyond it is an outlier, how far says nothing
+constexpr int kComparedRows = 80;  // those filled at a time, and patches around
 
 /// A feature in units of another scale: saturated() of what it was.
 float rescaled(float value, float ratio) {
@@ -56,7 +57,9 @@ Merge::Merge(const SampledFrame& own, std::vector<Neighbour> before, std::vector
       height_(own.frame().height()),
       apart_(width_, ApartPlanes::kChannels * static_cast<int>(neighbours()),
              std::min(kComparedRows, height_)),
-      counts_(own.frame().counts()) {}
+      counts_(own.frame().counts()) {
+    counts_.luminance = counts_.light = counts_.noise = counts_.removed = 0;
+}
 
 void Merge::startAbove(int first) { comparedRows_ = std::max(0, first - kPatchRadius); }
 
@@ -65,14 +68,25 @@ void Merge::fill(int first, int end, PixelRows& out) {
     apart_.claim(comparedRows_, compared);
     parallelFor(comparedRows_, compared, [&](std::int64_t y) { compareRow(static_cast<int>(y)); });
     comparedRows_ = compared;
-    std::vector<double> merged(static_cast<std::size_t>(end - first));
-    parallelFor(first, end, [&](std::int64_t y) {
-        merged[static_cast<std::size_t>(y - first)] = mergeRow(static_cast<int>(y), out);
-    });
-    for (int y = first; y < end; ++y) {
-        merged_ += merged[static_cast<std::size_t>(y - first)];
-        const float* const n = frame_.frame().fine().data().row(planes_.count(), y);
-        for (int x = 0; x < width_; ++x) own_ += static_cast<double>(n[x]);
+    parallelFor(first, end, [&](std::int64_t y) { mergeRow(static_cast<int>(y), out); });
+    for (int y = first; y < end; ++y)
+        if (frame_.isOwn(y)) countRow(y, out);
+}
+
+void Merge::countRow(int y, const PixelRows& out) {
+    const float* const own = frame_.frame().fine().data().row(planes_.count(), y);
+    for (int x = 0; x < width_; ++x) {
+        const auto n = static_cast<double>(out.data.row(planes_.count(), y)[x]);
+        own_ += static_cast<double>(own[x]);
+        merged_ += n;
+        double rgb[3], lost[3];
+        for (int c = 0; c < 3; ++c) {
+            lost[c] = static_cast<double>(out.data.row(planes_.removed() + c, y)[x]);
+            rgb[c] = plainMean(out.data, planes_, c, x, y) + lost[c];
+        }
+        counts_.light += n * luminance(rgb[0], rgb[1], rgb[2]);
+        counts_.luminance += n * static_cast<double>(luminance(rgb));
+        counts_.removed += n * static_cast<double>(luminance(lost));
     }
 }
 
@@ -88,8 +102,8 @@ void Merge::compareRow(int y) {
         for (std::size_t k = 0; k < list->size(); ++k) {
             const SampledFrame* const to = (*list)[k].frame;
             const std::size_t number = next ? before_.size() + k : k;
-            float* const unlike = apart_.row(
-                ApartPlanes::kChannels * static_cast<int>(number) + ApartPlanes::kUnlike, y);
+            float* const unlike =
+                apart_.row(ApartPlanes::kChannels * static_cast<int>(number) + ApartPlanes::kUnlike, y);
             std::fill_n(unlike, width_, 0.f);
             // One frame farther: by the motion of what is there, without one as it lies.
             const auto move = [&](const SampledFrame& of, bool forward, const float* place, float* step) {
@@ -140,7 +154,8 @@ void Merge::compareRow(int y, std::size_t k, const std::vector<float>& places) {
         out(ApartPlanes::kColumn)[x] = place[0];
         out(ApartPlanes::kRow)[x] = place[1];
         if (place[0] == kNowhere) continue;
-        const auto col = static_cast<int>(std::lround(place[0])), row = static_cast<int>(std::lround(place[1]));
+        const auto col = static_cast<int>(std::lround(place[0])),
+                   row = static_cast<int>(std::lround(place[1]));
         if (neighbour(k).sameSeed && col == x && row == y) {
             out(ApartPlanes::kColumn)[x] = kNowhere;
             continue;
@@ -167,8 +182,7 @@ void Merge::compareRow(int y, std::size_t k, const std::vector<float>& places) {
             const auto i = static_cast<std::size_t>(f);
             const float ratio = scale[i] / layout_.scale[i];
             const float d = fa[plane(f)] - rescaled(fb[plane(f)], ratio);
-            const float u =
-                fa[plane(features_.error(f))] + ratio * ratio * fb[plane(features_.error(f))];
+            const float u = fa[plane(features_.error(f))] + ratio * ratio * fb[plane(features_.error(f))];
             distance += (d * d - u) / (kFeatureWidth2 + 2 * u);
         }
         out(ApartPlanes::kUnlike)[x] += std::max(0.f, distance);
@@ -224,27 +238,33 @@ void Merge::addTaps(int x, int y, std::size_t k, const std::vector<float>& weigh
     const float left = std::floor(column), top = std::floor(row);
     const float beyond[2] = {smoothstep(column - left), smoothstep(row - top)};
     for (int j = 0; j < 4; ++j) {
-        const float part = (j % 2 == 0 ? 1 - beyond[0] : beyond[0]) * (j / 2 == 0 ? 1 - beyond[1] : beyond[1]);
+        const float part =
+            (j % 2 == 0 ? 1 - beyond[0] : beyond[0]) * (j / 2 == 0 ? 1 - beyond[1] : beyond[1]);
         if (part <= 0) continue;
         const int c = std::clamp(static_cast<int>(left) + j % 2, 0, width_ - 1),
                   r = std::clamp(static_cast<int>(top) + j / 2, 0, height_ - 1);
         if (of.data.row(planes_.count(), r)[c] <= 0) continue;
-        taps.push_back({of.data.row(0, r) + c, of.squares.row(0, r) + c,
-                        layout_.features > 0 ? of.raw.row(0, r) + c : nullptr, &frame.layout().scale, part,
+        taps.push_back({of.data.row(0, r) + c,
+                        of.squares.row(0, r) + c,
+                        layout_.features > 0 ? of.raw.row(0, r) + c : nullptr,
+                        &frame.layout().scale,
+                        part,
                         {part * weight[0], part * weight[1]}});
     }
 }
 
-/// The sum of effective counts.
-double Merge::mergeRow(int y, PixelRows& out) const {
+void Merge::mergeRow(int y, PixelRows& out) const {
     const std::vector<float> weights = weightsOf(y);
     const PixelRows& own = frame_.frame().fine().pixels();
     const auto plane = [&](int p) { return static_cast<std::size_t>(p) * static_cast<std::size_t>(width_); };
-    double merged = 0;
     std::vector<Tap> taps;
     for (int x = 0; x < width_; ++x) {
-        taps.assign(1, {own.data.row(0, y) + x, own.squares.row(0, y) + x,
-                        layout_.features > 0 ? own.raw.row(0, y) + x : nullptr, &layout_.scale, 1, {1, 1}});
+        taps.assign(1, {own.data.row(0, y) + x,
+                        own.squares.row(0, y) + x,
+                        layout_.features > 0 ? own.raw.row(0, y) + x : nullptr,
+                        &layout_.scale,
+                        1,
+                        {1, 1}});
         for (std::size_t k = 0; k < neighbours(); ++k) addTaps(x, y, k, weights, taps);
         float* const to = out.data.row(0, y) + x;
         if (taps.size() == 1) {  // as they came, bit for bit
@@ -252,7 +272,6 @@ double Merge::mergeRow(int y, PixelRows& out) const {
             for (int p = 0; p < SquaresPlanes::kChannels; ++p)
                 out.squares.row(p, y)[x] = taps[0].squares[plane(p)];
             for (int p = 0; p < features_.rawChannels(); ++p) out.raw.row(p, y)[x] = taps[0].raw[plane(p)];
-            merged += static_cast<double>(to[plane(planes_.count())]);
             continue;
         }
         float count = 0;
@@ -308,9 +327,7 @@ double Merge::mergeRow(int y, PixelRows& out) const {
             out.raw.row(features_.error(f), y)[x] = error;
             out.raw.row(features_.difference(f), y)[x] = difference;
         }
-        merged += static_cast<double>(count);
     }
-    return merged;
 }
 
 }  // namespace vlx

@@ -11,7 +11,8 @@ namespace vlx {
 /// A frame beside the one that is kriged.
 struct Neighbour {
     const SampledFrame* frame;
-    bool sameSeed = false;  ///< its samples in a pixel are those of the own frame: where nothing moves, no news
+    bool sameSeed =
+        false;  ///< its samples in a pixel are those of the own frame: where nothing moves, no news
 };
 
 /// Refers to its frames, all of whose rows are filled and kept.
@@ -34,6 +35,7 @@ class Merge : public PixelSource {
     /// Neither is less than 0. Scatter and features are merged by the same weights, those of both halves
     /// averaged.
     void fill(int first, int end, PixelRows& out) override;
+    /// The frame's own, but for `luminance`, `light` and `noise`: these are of the merged data.
     const FrameCounts& counts() const override { return counts_; }
     std::uint64_t ringBytes() const override { return apart_.bytes(); }
 
@@ -49,8 +51,10 @@ class Merge : public PixelSource {
     void compareRow(int y);
     void compareRow(int y, std::size_t k, const std::vector<float>& places);
     std::vector<float> weightsOf(int y) const;
-    double mergeRow(int y, PixelRows& out) const;
-    void addTaps(int x, int y, std::size_t k, const std::vector<float>& weights, std::vector<Tap>& taps) const;
+    void mergeRow(int y, PixelRows& out) const;
+    void countRow(int y, const PixelRows& out);
+    void addTaps(int x, int y, std::size_t k, const std::vector<float>& weights,
+                 std::vector<Tap>& taps) const;
 
     const SampledFrame& frame_;
     const SampleLayout& layout_;

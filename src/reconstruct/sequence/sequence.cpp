@@ -1,11 +1,13 @@
 #include "variolux/reconstruct/sequence.h"
 
 #include <map>
+#include <string>
 
 #include "reconstruct/common/methods.h"
 #include "reconstruct/drift/pipeline.h"
 #include "reconstruct/sequence/merge.h"
 #include "variolux/base/error.h"
+#include "variolux/base/memory.h"
 
 namespace vlx {
 
@@ -20,7 +22,21 @@ struct LoadedFrame {
           samples(*source, options, Kept::Whole, clock) {
         const int first = outline.data.y - source->header().data.y * options.scale;
         samples.own(first, first + outline.data.height);
+        requireFrames(options);
         samples.frame().fillAll();
+    }
+
+    /// That as many as are held at a time fit into memory.
+    void requireFrames(const Drift& options) const {
+        const auto frames = static_cast<std::uint64_t>(2 * options.temporal + 1);
+        const std::uint64_t bytes = frames * samples.frame().ringBytes();
+        const std::string what =
+            std::to_string(frames) + " frames of this size (--temporal with a smaller number takes less)";
+        requireMemory(source->path(), bytes, what);
+        if (options.maxMemory > 0 && bytes > options.maxMemory)
+            throw Error(source->path(), "expected a memory limit of at least " +
+                                            std::to_string((bytes + 999'999) / 1'000'000) + "M for " + what +
+                                            ", found " + std::to_string(options.maxMemory / 1'000'000) + "M");
     }
 
     std::unique_ptr<SampleSource> source;
@@ -30,6 +46,26 @@ struct LoadedFrame {
     SampledFrame samples;
 };
 
+bool sameSeed(const LoadedFrame& a, const LoadedFrame& b) {
+    const auto &x = a.source->header().seed, &y = b.source->header().seed;
+    return x && y && *x == *y;
+}
+
+/// Throws Error unless `there` shows as much as `own`, in the same way.
+void requireAlike(const LoadedFrame& there, const LoadedFrame& own) {
+    const Window &a = there.source->header().data, &b = own.source->header().data;
+    const std::string help = ", as " + own.source->path() + " has: --temporal 0 kriges each frame by itself";
+    if (a != b)
+        throw Error(there.source->path(),
+                    "expected pixels " + windowText(b) + ", found " + windowText(a) + help);
+    const SampleLayout &x = there.samples.frame().layout(), &y = own.samples.frame().layout();
+    if (x.radiance != y.radiance || x.features != y.features || x.alpha != y.alpha || x.group != y.group)
+        throw Error(there.source->path(), "expected " + std::to_string(y.radiance) +
+                                              " channels of radiance and " + std::to_string(y.features) +
+                                              " features, found " + std::to_string(x.radiance) + " and " +
+                                              std::to_string(x.features) + help);
+}
+
 }  // namespace
 
 struct Sequence::Impl {
@@ -38,19 +74,22 @@ struct Sequence::Impl {
     std::map<int, std::unique_ptr<LoadedFrame>> frames;  // null: there is no such frame
 
     LoadedFrame* load(int frame) {
-        const auto [at, isNew] = frames.try_emplace(frame);
-        if (isNew)
-            if (std::unique_ptr<SampleSource> source = open(frame))
-                at->second = std::make_unique<LoadedFrame>(std::move(source), options);
-        return at->second.get();
+        const auto found = frames.find(frame);
+        if (found != frames.end()) return found->second.get();
+        std::unique_ptr<LoadedFrame> loaded;
+        if (std::unique_ptr<SampleSource> source = open(frame))
+            loaded = std::make_unique<LoadedFrame>(std::move(source), options);
+        return (frames[frame] = std::move(loaded)).get();
     }
     /// Frames beside `frame`, the nearest first, up to one that is not there.
     std::vector<Neighbour> beside(int frame, int step) {
         std::vector<Neighbour> found;
-        for (int k = 1; k <= options.temporal; ++k) {
-            LoadedFrame* const there = load(frame + step * k);
+        const LoadedFrame& own = *load(frame);
+        for (int k = 1; k <= options.temporal && frame + step * k >= 0; ++k) {
+            const LoadedFrame* const there = load(frame + step * k);
             if (!there) break;
-            found.push_back({&there->samples});
+            requireAlike(*there, own);
+            found.push_back({&there->samples, sameSeed(*there, own)});
         }
         return found;
     }
@@ -59,23 +98,38 @@ struct Sequence::Impl {
 Sequence::Sequence(Open open, const Drift& options) : impl_(new Impl{std::move(open), options, {}}) {}
 Sequence::~Sequence() = default;
 
-Image Sequence::outline(int frame) { return impl_->load(frame)->outline; }
+void Sequence::forget(int frame) { impl_->frames.erase(frame); }
 
 ReconstructionReport Sequence::reconstruct(int frame, const RowSink& sink, const Progress& progress) {
     const int reach = impl_->options.temporal;
     std::erase_if(impl_->frames, [&](const auto& entry) {
-        return entry.first < frame - reach || entry.first > frame + reach;
+        return entry.first < frame - reach || entry.first > frame + reach || !entry.second;
     });
-    LoadedFrame& own = *impl_->load(frame);
+    const LoadedFrame* const own = impl_->load(frame);
+    if (!own) throw Error("", "expected frame " + std::to_string(frame) + " of the sequence, found none");
     ReconstructionReport report;
-    report.method.emplace<DriftReport>().seconds = own.seconds;
-    StageClock clock(std::get<DriftReport>(report.method).seconds);
-    Merge merge(own.samples, impl_->beside(frame, -1), impl_->beside(frame, 1));
-    const Frame& plain = own.samples.frame();
+    DriftReport& drift = report.method.emplace<DriftReport>();
+    drift.seconds = own->seconds;
+    StageClock clock(drift.seconds);
+    const std::vector<Neighbour> before = impl_->beside(frame, -1), after = impl_->beside(frame, 1);
+    clock.addTo("other frames");
+    Merge merge(own->samples, before, after);
+    const Frame& plain = own->samples.frame();
     Frame merged(plain.layout(), plain.picture(), impl_->options, plain.width(), plain.height(), Kept::Rows,
                  merge, clock);
-    FrameKriging(*own.source, impl_->options, merged, report, clock).run(sink, progress);
+    FrameKriging(*own->source, impl_->options, merged, report, clock).run(sink, progress);
+    drift.frames = static_cast<int>(before.size() + after.size());
+    drift.framesGain = merge.gain();
+    for (const auto* list : {&before, &after})
+        for (const Neighbour& of : *list) drift.equalSeeds += of.sameSeed;
     return report;
+}
+
+Reconstruction Sequence::reconstruct(int frame, const Progress& progress) {
+    const LoadedFrame* const own = impl_->load(frame);
+    if (!own) throw Error("", "expected frame " + std::to_string(frame) + " of the sequence, found none");
+    return wholeOf(*own->source, own->outline,
+                   [&](const RowSink& keep) { return reconstruct(frame, keep, progress); });
 }
 
 }  // namespace vlx
