@@ -67,6 +67,12 @@
 ///    semivariance of the picture at the distance of the nearest samples, towards the field's own spread. Of
 ///    features, what exceeds their scale counts by its logarithm, and in a neighbourhood the few values that
 ///    lie farther from the range of all others than it is wide count as not known.
+/// 10. *Sequences* (sequence.h): data of the frames before and after join the frame's own before step 2. What
+///    was at a pixel's point, by its motion from frame to frame, is interpolated between the four pixels
+///    around, and weighted by exp(-d - f - m): d the distance of the other half's patches as in step 3, f that
+///    of the features, m the square of what motion there and back differs by, in pixels. A frame's own data
+///    weigh 1. Kriging then sees more samples in a pixel, and the error map counts what they are worth:
+///    (sum w n)^2 / sum w^2 n.
 ///
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
 /// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights
