@@ -92,7 +92,8 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
         "gaussian: the average, Gaussian filtered (no layer stddev)");
     addChoice(app, "--quality", o.krige.quality,
               {{"draft", Quality::Draft}, {"standard", Quality::Standard}, {"high", Quality::High}},
-              "krige: draft: one model, sparse neighbourhoods; standard: three models; high: neighbourhoods "
+              "krige: draft: one model, sparse neighbourhoods, an image without compression; standard: three "
+              "models; high: neighbourhoods "
               "twice as dense along each axis");
     addChoice(app, "--fireflies", o.krige.fireflies,
               {{"keep", Fireflies::Keep}, {"robust", Fireflies::Robust}, {"clamp", Fireflies::Clamp}},

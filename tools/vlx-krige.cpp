@@ -215,6 +215,9 @@ void kriged(const vlx::KrigeOptions& o, const vlx::Progress& progress, Shot* sho
             "--band, --scale and --max-memory go with --drop-layers or a dump, without --template");
     vlx::ImageWriteOptions write;
     write.attributes["Software"] = "vlx-krige";
+    // Noise-free floats hardly compress: by a fifth, for a tenth of a draft's time.
+    if (o.method == vlx::KrigeMethod::Krige && o.krige.quality == vlx::Quality::Draft)
+        write.compression = "none";
     if (!o.samplingMap.empty() && !o.samplingMap.ends_with(".exr"))
         throw CLI::ValidationError("--sampling-map",
                                    "expected a name that ends with .exr, found '" + o.samplingMap + "'");
