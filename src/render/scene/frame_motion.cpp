@@ -47,7 +47,7 @@ TracedPoint tracedPoint(const Scene& scene, const Ray& ray, const Hit& hit, floa
     return {own, c.before.at(time).point(held), c.after.at(time).point(held)};
 }
 
-Vec2 way(const View::Projection& from, const View::Projection& to) {
+Vec2 wayBetween(const View::Projection& from, const View::Projection& to) {
     const Vec2 d{to.x - from.x, to.y - from.y};
     const bool known = from.density > 0 && to.density > 0 && std::isfinite(d.x) && std::isfinite(d.y);
     return known ? d : Vec2{Moved::kUnknown, Moved::kUnknown};
@@ -67,12 +67,12 @@ Moved FrameMotion::of(const Ray& ray, const std::optional<Hit>& hit) const {
     if (!hit) {
         const auto seen = [&](const View& view) { return view.projectFar(ray.direction, time); };
         const View::Projection here = seen(own_);
-        return {way(here, seen(before_)), way(here, seen(after_))};
+        return {wayBetween(here, seen(before_)), wayBetween(here, seen(after_))};
     }
     const TracedPoint point = tracedPoint(scene_, ray, *hit, time);
     const View::Projection here = own_.project(point.own, kMiddleOfLens, time);
-    return {way(here, before_.project(point.before, kMiddleOfLens, time)),
-            way(here, after_.project(point.after, kMiddleOfLens, time))};
+    return {wayBetween(here, before_.project(point.before, kMiddleOfLens, time)),
+            wayBetween(here, after_.project(point.after, kMiddleOfLens, time))};
 }
 
 }  // namespace vlx::render
