@@ -127,7 +127,8 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
         app.add_option("--frames", o.frames,
                        "Trace these frames, for example 1-100x2,150: #### in the names of files stands for\n"
                        "the frame's number F. The shutter is moved by F / --fps seconds, the seed is a hash\n"
-                       "of --seed and F. When a frame fails the others go on")
+                       "of --seed and F. Samples hold motion vectors where the camera or something in\n"
+                       "sight moves from frame to frame. When a frame fails the others go on")
             ->excludes("--list-cameras")
             ->excludes("--explain")
             ->type_name("LIST");

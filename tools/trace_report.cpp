@@ -93,6 +93,10 @@ void summarize(const TraceOptions& o, const Scene& loaded, const RenderReport& r
                                  {"traceCpuSeconds", report.traceCpuSeconds},
                                  {"writeCpuSeconds", report.writeCpuSeconds},
                                  {"warnings", loaded.report.warnings}};
+        if (o.frame) {
+            const RecordedMotion& motion = o.render.plan->motion;
+            j["motion"] = {{"recorded", motion.recorded}, {"reason", motion.reason}};
+        }
         if (!o.render.hierarchical) j["samplesPerPixel"] = o.render.spp;
         if (o.render.hierarchical) j["refinedCells"] = report.refinedCells;
         std::cout << j.dump(2) << "\n";

@@ -22,9 +22,10 @@ struct InfoCommand {
 
     void bind(CLI::App& app) {
         app.description(
-            "Print what a dump holds: channels, samples a pixel, size, renderer, and what it lacks and what "
-            "that\n"
-            "costs the reconstruction. Reads the whole file.");
+            "Print what a dump holds: channels, samples a pixel, size, renderer, motion, and what it lacks "
+            "and "
+            "what\n"
+            "that costs the reconstruction. Reads the whole file.");
         app.add_option("FILE", file, "The dump: a deep scanline OpenEXR file, of any renderer")->required();
         app.add_flag("--json", json, "Print JSON instead of text");
     }

@@ -88,6 +88,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     if (o.frame) {
         exposure.open += *o.frame / o.framesPerSecond;
         exposure.close += *o.frame / o.framesPerSecond;
+        exposure.frame = 1 / o.framesPerSecond;
     }
     if (o.environmentConstant.size() == 3)
         o.environment.constant =
@@ -117,6 +118,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     for (const std::string& warning : plan.warnings) note(o, "warning: " + warning);
     applyPlan(loaded, plan);
     o.render.follow(plan);
+    if (plan.motion.recorded) note(o, "motion is recorded: " + plan.motion.reason);
     const Accelerator accelerator(loaded, o.render.path.effects);
     const IntegratorChoice choice = chooseIntegrator(o, loaded, accelerator);
     if (!o.explain.empty()) return printPlan(o, loaded, plan, choice);

@@ -75,6 +75,9 @@ DumpInfo inspectDump(const std::string& path, const Progress& progress) {
         findChannel(info.header, "sample.x") >= 0 && findChannel(info.header, "sample.y") >= 0;
     if (positions) channels.insert(channels.end(), {"sample.x", "sample.y"});
     PositionCheck check(info.header);
+    MotionCheck motion(info.header);
+    for (const std::string& name : motion.channels())
+        if (std::ranges::find(channels, name) == channels.end()) channels.push_back(name);
     info.layers = layersFoundBy(reader);
     std::set<std::uint32_t> replicates;
     for (int row = 0; row < window.height;) {
@@ -84,6 +87,7 @@ DumpInfo inspectDump(const std::string& path, const Progress& progress) {
             for (const float value : band.values[static_cast<std::size_t>(c)])
                 replicates.insert(replicateNumber(value).value());
         if (positions) check.add(band);
+        motion.add(band);
         for (std::size_t p = 0; p < band.pixels(); ++p) {
             const auto count = static_cast<std::uint32_t>(band.offsets[p + 1] - band.offsets[p]);
             info.minSamples = std::min(info.minSamples, count);
@@ -99,6 +103,7 @@ DumpInfo inspectDump(const std::string& path, const Progress& progress) {
         if (progress) progress(row, window.height);
     }
     info.positions = check.report();
+    if (!motion.channels().empty()) info.motion = motion.report();
     info.replicates = static_cast<std::uint32_t>(replicates.size());
     info.meanSamples = static_cast<double>(info.samples) / static_cast<double>(window.pixels());
     std::uint64_t bytesPerSample = 0;
@@ -149,6 +154,13 @@ std::string toText(const DumpInfo& info) {
                            " replicates; reading adds them to the samples of their replicate");
     if (header.independentHalves)
         line("halves", "samples of even and odd number are independent randomisations");
+    if (info.motion) {
+        for (std::size_t k = 0; k < 2; ++k) {
+            const MotionReport& motion = (*info.motion)[k];
+            line(k == 0 ? "motion, before" : "motion, next", toText(motion));
+            if (const std::string doubt = doubtOf(motion); !doubt.empty()) line("WARNING", doubt);
+        }
+    }
     if (info.missing.empty()) line("missing", "nothing");
     for (const auto& part : info.missing) line("missing", part.what + ": " + part.cost);
     return text;
@@ -188,6 +200,14 @@ std::string toJson(const DumpInfo& info) {
         json["positions"] = {{"notFinite", info.positions.notFinite},
                              {"outside", info.positions.outside},
                              {"warning", toText(info.positions)}};
+    if (info.motion) {
+        const auto report = [](const MotionReport& motion) {
+            return Json{{"samples", motion.samples}, {"known", motion.known},   {"still", motion.still},
+                        {"leaving", motion.leaving}, {"median", motion.median}, {"largest", motion.largest},
+                        {"warning", doubtOf(motion)}};
+        };
+        json["motion"] = {{"before", report((*info.motion)[0])}, {"next", report((*info.motion)[1])}};
+    }
     if (header.samples) json["samplesAskedFor"] = *header.samples;
     if (header.splatReplicates > 0) json["splatReplicates"] = header.splatReplicates;
     if (header.seed) json["seed"] = *header.seed;

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "edit/motion_check.h"
 #include "variolux/base/progress.h"
 #include "variolux/dump/format.h"
 #include "variolux/dump/positions.h"
@@ -24,7 +27,9 @@ struct DumpInfo {
     std::uint64_t nonFiniteSamples = 0;  ///< samples with a NaN or infinite R, G or B
     std::uint32_t replicates = 0;        ///< different values of sample.replicate; 0 without the channel
     PositionReport positions;            ///< without samples where the dump has no positions
-    std::string layers;                  ///< layersFoundBy(): why these may be no samples of the camera
+    std::optional<std::array<MotionReport, 2>>
+        motion;          ///< to the frame before and the next, where it is there
+    std::string layers;  ///< layersFoundBy(): why these may be no samples of the camera
     std::vector<MissingPart> missing;
 };
 

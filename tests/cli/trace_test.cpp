@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "../render/gltf_text.h"
 #include "run_tool.h"
 #include "temporary_folder.h"
 #include "variolux/dump/reader.h"
@@ -179,6 +181,39 @@ TEST(VlxTrace, TimeAndErrorChooseTheSamples) {
     };
     EXPECT_GE(samples("--time", "0.2"), 2);
     EXPECT_LT(samples("--target-error", "1"), samples("--target-error", "0.05"));
+}
+
+TEST(VlxTrace, FramesHoldMotionWhereSomethingMoves) {
+    const TemporaryFolder folder;
+    render::GltfText scene;  // moves by 2 in the second second only
+    render::animate(scene, 0, "translation", {1, 2}, {0, 0, 0, 2, 0, 0}, "VEC3");
+    render::writeText(folder / "a.gltf", scene.text());
+    const auto traced = [&](const std::string& frames, const std::string& name) {
+        const ToolRun run = trace({folder / "a.gltf", "-o", folder / name, "--width", "16", "--spp", "2",
+                                   "--frames", frames, "--fps", "10", "--json"});
+        EXPECT_EQ(run.exitCode, 0) << run.err;
+        return run;
+    };
+    const ToolRun moving = traced("15", "a_##.exr"), still = traced("2", "a_##.exr");
+    const auto motion = nlohmann::json::parse(moving.out)["motion"];
+    EXPECT_TRUE(motion["recorded"].get<bool>());
+    EXPECT_NE(moving.err.find("motion is recorded: " + motion["reason"].get<std::string>()),
+              std::string::npos)
+        << moving.err;
+    EXPECT_FALSE(nlohmann::json::parse(still.out)["motion"]["recorded"].get<bool>());
+    EXPECT_EQ(still.err.find("motion"), std::string::npos) << still.err;
+
+    const ToolRun info = runTool("vlx-pack", {"info", folder / "a_15.exr", "--json"});
+    const auto report = nlohmann::json::parse(info.out)["motion"];
+    EXPECT_EQ(report["before"]["known"], report["before"]["samples"]);
+    const double way = 16 / 2 / std::tan(0.4) * 0.2 / 3;  // of the square; what is beside it is at rest
+    EXPECT_NEAR(report["before"]["largest"].get<double>(), way, 1e-3);
+    EXPECT_NEAR(report["next"]["largest"].get<double>(), way, 1e-3);
+    EXPECT_GT(report["next"]["still"].get<int>(), 0);
+    EXPECT_EQ(report["next"]["warning"], "");
+    EXPECT_NE(runTool("vlx-pack", {"info", folder / "a_15.exr"}).out.find("motion, next"), std::string::npos);
+    EXPECT_FALSE(nlohmann::json::parse(runTool("vlx-pack", {"info", folder / "a_02.exr", "--json"}).out)
+                     .contains("motion"));
 }
 
 TEST(VlxTrace, AppendsToADump) {

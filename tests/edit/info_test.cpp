@@ -72,6 +72,59 @@ TEST(DumpInfo, NamesWhatIsMissing) {
     for (const auto& part : info.missing) EXPECT_NE(toText(info).find(part.cost), std::string::npos);
 }
 
+TEST(DumpInfo, MeasuresMotion) {
+    const TemporaryFolder folder;
+    std::vector<DumpChannel> channels = standardChannels();
+    for (const std::string_view name : kMotionChannels)
+        channels.push_back({std::string(name), ChannelType::Float});
+    TestDump dump = makeDump({10, 0, 5, 2}, channels, [](int, int) { return 1; });
+    tame(dump);
+    dump.header.display = {0, 0, 20, 10};
+    const auto channel = [&](std::string_view name) -> std::vector<float>& {
+        return dump.all.values[static_cast<std::size_t>(dump.all.channel(name))];
+    };
+    for (std::size_t p = 0; p < 10; ++p) {
+        channel("sample.x")[p] = 10.25f + static_cast<float>(p % 5);
+        channel("sample.y")[p] = 0.75f + static_cast<float>(p / 5);
+        channel("motion.x")[p] = p < 3 ? 0 : 3;  // of the second row's, two leave by the right in the end
+        channel("motion.y")[p] = p < 3 ? 0 : 4;
+        channel("motionNext.x")[p] = p < 6 ? NAN : -1;
+        channel("motionNext.y")[p] = -1;
+    }
+    channel("motion.x")[9] = 6;
+    channel("motion.y")[9] = 8;
+    writeDump(folder / "a.exr", dump);
+    const DumpInfo info = inspectDump(folder / "a.exr");
+    ASSERT_TRUE(info.motion);
+    const MotionReport &before = (*info.motion)[0], &next = (*info.motion)[1];
+    EXPECT_EQ(before.samples, 10u);
+    EXPECT_EQ(before.known, 10u);
+    EXPECT_EQ(before.still, 3u);
+    EXPECT_EQ(before.leaving, 1u);
+    EXPECT_EQ(before.median, 5);
+    EXPECT_EQ(before.largest, 10);
+    EXPECT_EQ(doubtOf(before), "");
+    EXPECT_EQ(next.known, 4u);
+    EXPECT_EQ(next.leaving, 0u);
+    EXPECT_NEAR(next.median, std::sqrt(2.0), 0.01 * std::sqrt(2.0));
+    EXPECT_NE(doubtOf(next), "");
+    const std::string text = toText(info);
+    EXPECT_NE(text.find("known of 100 % of the samples; of those 30 % do not move, 10 % leave the picture; 5 "
+                        "pixels (median), 10 (most)"),
+              std::string::npos)
+        << text;
+    EXPECT_NE(text.find(doubtOf(next)), std::string::npos) << text;
+    const auto json = nlohmann::json::parse(toJson(info));
+    EXPECT_EQ(json["motion"]["before"]["largest"], 10);
+    EXPECT_EQ(json["motion"]["next"]["known"], 4);
+    EXPECT_EQ(json["motion"]["next"]["warning"], doubtOf(next));
+
+    dump = makeDump({0, 0, 2, 2}, {channels.begin(), channels.end() - 1}, [](int, int) { return 1; });
+    writeDump(folder / "b.exr", dump);
+    EXPECT_FALSE(inspectDump(folder / "b.exr").motion) << "all four or none";
+    EXPECT_EQ(toText(inspectDump(folder / "b.exr")).find("leave the picture"), std::string::npos);
+}
+
 TEST(DumpInfo, JsonSaysTheSame) {
     const TemporaryFolder folder;
     TestDump dump = makeDump({-1, 2, 3, 2}, standardChannels(), [](int, int) { return 4; });

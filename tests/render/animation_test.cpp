@@ -31,18 +31,6 @@ std::string failure(const GltfText& g) {
     return "no error";
 }
 
-/// Adds an animation of one channel.
-void animate(GltfText& g, int node, const std::string& path, const std::vector<float>& times,
-             const std::vector<float>& values, const std::string& type,
-             const std::string& interpolation = "LINEAR") {
-    const int input = g.floats(times, "SCALAR"), output = g.floats(values, type);
-    nlohmann::json animation;
-    animation["name"] = "play";
-    animation["samplers"] = {{{"input", input}, {"output", output}, {"interpolation", interpolation}}};
-    animation["channels"] = {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}};
-    g.json["animations"].push_back(animation);
-}
-
 Plan planOf(const Scene& s) { return planEffects(s, {0, 32, 32, 12, {}}); }
 
 TEST(Animation, MovesANodeWhileTheShutterIsOpen) {

@@ -123,6 +123,18 @@ struct GltfText {
     }
 };
 
+/// Adds an animation of one channel.
+inline void animate(GltfText& g, int node, const std::string& path, const std::vector<float>& times,
+                    const std::vector<float>& values, const std::string& type,
+                    const std::string& interpolation = "LINEAR") {
+    const int input = g.floats(times, "SCALAR"), output = g.floats(values, type);
+    nlohmann::json animation;
+    animation["name"] = "play";
+    animation["samplers"] = {{{"input", input}, {"output", output}, {"interpolation", interpolation}}};
+    animation["channels"] = {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}};
+    g.json["animations"].push_back(animation);
+}
+
 inline void writeText(const std::string& path, const std::string& text) {
     std::ofstream(path, std::ios::binary) << text;
 }

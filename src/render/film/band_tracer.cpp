@@ -19,30 +19,53 @@ Window clipped(int rx, int ry, const Window& window) {
 
 }  // namespace
 
+const std::vector<DumpChannel>& tracedChannels() {
+    static const std::vector<DumpChannel> channels = [] {
+        std::vector<DumpChannel> all = standardChannels();
+        for (const std::string_view name : kMotionChannels)
+            all.push_back({std::string(name), ChannelType::Float});
+        return all;
+    }();
+    return channels;
+}
+
 /// A band's channels, to be written sample by sample.
 class BandTracer::ChannelArrays {
   public:
     explicit ChannelArrays(SampleBand& band) : count_(band.values.size()) {
-        const auto& standard = standardChannels();
+        const auto& all = tracedChannels();
         for (std::size_t c = 0, at = 0; c < count_; ++c, ++at) {
-            while (standard[at].name != band.channels[c]) ++at;  // in the same order, some left out
+            while (all[at].name != band.channels[c]) ++at;  // in the same order, some left out
             channels_[c] = {band.values[c].data(), at};
         }
     }
     void put(std::uint64_t at, const Record& r) const {
         const PathSample& s = r.sample;
-        const std::array<float, 14> values = {s.radiance.x, s.radiance.y,
-                                              s.radiance.z, s.hit ? 1.f : 0.f,
-                                              s.depth,      r.x,
-                                              r.y,          s.albedo.x,
-                                              s.albedo.y,   s.albedo.z,
-                                              s.normal.x,   s.normal.y,
-                                              s.normal.z,   static_cast<float>(r.replicate)};
+        const std::array<float, kChannels> values = {s.radiance.x,
+                                                     s.radiance.y,
+                                                     s.radiance.z,
+                                                     s.hit ? 1.f : 0.f,
+                                                     s.depth,
+                                                     r.x,
+                                                     r.y,
+                                                     s.albedo.x,
+                                                     s.albedo.y,
+                                                     s.albedo.z,
+                                                     s.normal.x,
+                                                     s.normal.y,
+                                                     s.normal.z,
+                                                     static_cast<float>(r.replicate),
+                                                     s.moved.before.x,
+                                                     s.moved.before.y,
+                                                     s.moved.after.x,
+                                                     s.moved.after.y};
         for (std::size_t c = 0; c < count_; ++c) channels_[c].first[at] = values[channels_[c].second];
     }
 
   private:
-    std::array<std::pair<float*, std::size_t>, 14> channels_{};  ///< and which value each takes
+    static constexpr std::size_t kChannels = 18;
+
+    std::array<std::pair<float*, std::size_t>, kChannels> channels_{};  ///< and which value each takes
     std::size_t count_;
 };
 

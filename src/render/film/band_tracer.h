@@ -13,6 +13,9 @@
 
 namespace vlx::render {
 
+/// The channels that the tracer may write, in its order: the standard ones, and those of motion.
+const std::vector<DumpChannel>& tracedChannels();
+
 /// Everything about one sample that goes into the dump.
 struct Record {
     int pixel;  ///< inside the region, row by row

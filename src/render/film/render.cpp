@@ -1,5 +1,6 @@
 #include "render/film/render.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cassert>
 #include <chrono>
@@ -7,6 +8,7 @@
 #include <limits>
 
 #include "render/film/band_tracer.h"
+#include "render/scene/frame_motion.h"
 #include "variolux/base/error.h"
 #include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
@@ -41,13 +43,16 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     if (!options.integratorReason.empty()) header.extra["integrator"] = options.integratorReason;
     const bool replicates = header.splatReplicates > 1 || options.replicates > 1 ||
                             (options.earlier != nullptr && options.earlier->hasReplicates());
+    const Plan plan = options.plan ? *options.plan : planEffects(scene, planOptions(options));
     // What is added to a dump has the channels that are there.
     const RecordedFeatures features =
         options.plan && options.earlier == nullptr ? options.plan->features : RecordedFeatures{};
-    for (const DumpChannel& channel : standardChannels()) {
+    const bool motion = options.earlier != nullptr || plan.motion.recorded;
+    for (const DumpChannel& channel : tracedChannels()) {
         if (!replicates && channel.name == "sample.replicate") continue;
         if (!features.albedo && channel.name.starts_with("albedo.")) continue;
         if (!features.normalAndDepth && (channel.name.starts_with("N.") || channel.name == "Z")) continue;
+        if (!motion && std::ranges::count(kMotionChannels, channel.name) > 0) continue;
         if (options.earlier != nullptr && findChannel(options.earlier->header(), channel.name) < 0) continue;
         header.channels.push_back(channel);
     }
@@ -55,7 +60,6 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
     header.renderer = "vlx-trace" + (options.version.empty() ? "" : " " + options.version);
     header.scene = scene.name;
     header.pixelFilter = "box";
-    const Plan plan = options.plan ? *options.plan : planEffects(scene, planOptions(options));
     header.effects = plan.simulated();
     std::string leftOut;
     for (const PlannedEffect& e : plan.effects)
@@ -164,8 +168,12 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     DumpWriter writer(path, header);
     std::optional<SplatImages> splats;
     if (options.integrator == IntegratorKind::Bidirectional) splats.emplace(window, header.splatReplicates);
+    // Also where it is not this plan's to record, but a dump's that is added to: unknown without a sequence.
+    const FrameMotion motion(scene, scene.cameras[options.camera], options.width, options.height);
+    PathOptions traced = options.path;
+    if (scene.shutter.frame > 0 && findChannel(header, kMotionChannels[0]) >= 0) traced.motion = &motion;
     const std::unique_ptr<Integrator> integrator =
-        makeIntegrator(options.integrator, scene, accelerator, view, window, options.path);
+        makeIntegrator(options.integrator, scene, accelerator, view, window, traced);
     BandTracer bands(*integrator, options, header);
 
     const std::int64_t mostSpp = options.hierarchical

@@ -42,7 +42,7 @@ std::string faultOf(const tinygltf::PerspectiveCamera& p, bool zeroAspect) {
 }  // namespace
 
 Camera readCamera(const GltfFile& file, const tinygltf::Node& node, const Transform& toWorld,
-                  const Motion& motion) {
+                  const Motion& motion, const std::optional<Course>& course) {
     const auto index = static_cast<std::size_t>(node.camera);
     const tinygltf::Camera& source = file.model().cameras[index];
     Camera camera;
@@ -66,6 +66,9 @@ Camera readCamera(const GltfFile& file, const tinygltf::Node& node, const Transf
         if (!rigidPlace) camera.unusable = "its transform has no inverse while the shutter is open";
         camera.motion.places.push_back(rigidPlace.value_or(at));
     }
+    if (camera.course = course; course)
+        for (Motion* other : {&camera.course->before, &camera.course->after})
+            for (Transform& at : other->places) at = rigid(at).value_or(at);  // without one it sees nothing
     const auto extra = [&](const char* key) {
         return number(node.extras, key, number(source.extras, key, 0));
     };

@@ -56,6 +56,7 @@ PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler
         const std::uint32_t raySeed = seed + 2 * static_cast<std::uint32_t>(walk.bounces);
         const Ray& ray = walk.ray;
         const std::optional<Hit> hit = in.accelerator.intersect(ray, raySeed);
+        if (walk.bounces == 0 && in.options.motion != nullptr) result.moved = in.options.motion->of(ray, hit);
         if (!hit) {
             if (in.scene.environment) estimator.meet(walk, environmentMet(in, ray.direction));
             break;

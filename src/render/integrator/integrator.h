@@ -7,6 +7,7 @@
 #include "render/plan/effect_set.h"
 #include "render/scene/accelerator.h"
 #include "render/scene/camera.h"
+#include "render/scene/frame_motion.h"
 #include "render/scene/scene.h"
 #include "variolux/base/window.h"
 
@@ -23,6 +24,7 @@ struct PathOptions {
     /// What the scene calls for and is not wanted: lobes of surfaces, and caustics. The rest is the scene's
     /// to leave out (plan.h).
     EffectSet leftOut;
+    const FrameMotion* motion = nullptr;  ///< tells PathSample::moved; null: it is not wanted
 };
 
 /// What one camera sample yields.
@@ -33,6 +35,7 @@ struct PathSample {
     Rgb albedo{1, 1,
                1};  ///< reflectance at the first hit that is not perfectly smooth; 1 for emitters, misses
     Vec3 normal;    ///< shading normal there, towards the viewer; 0 on a miss
+    Moved moved;    ///< of what the camera ray met first, or of the direction
 };
 
 /// Light that a light subpath brings to a place of the picture.

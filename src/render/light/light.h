@@ -23,7 +23,8 @@ struct Light {
     /// KHR_lights_punctual's cone: factor clamp(cos x scale + offset, 0, 1)^2; 0 and 1 for all around.
     float coneScale = 0;
     float coneOffset = 1;
-    float range = 0;  ///< of Point and Spot; 0: without end
+    float range = 0;           ///< of Point and Spot; 0: without end
+    std::int32_t course = -1;  ///< of a sphere: index into the scene's courses, or -1
 
     // Mesh lights:
     std::uint32_t shape = 0;

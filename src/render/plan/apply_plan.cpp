@@ -39,6 +39,11 @@ void leaveOutOfMaterial(Material& m, const EffectSet& out) {
     }
 }
 
+/// What is left out of this picture's exposure is left out of its neighbours'.
+void freeze(Course& course) {
+    for (Motion* motion : {&course.before, &course.after}) motion->places = {motion->at(0.5f)};
+}
+
 }  // namespace
 
 bool tracerLeavesOut(Effect effect) {
@@ -70,11 +75,15 @@ void applyPlan(Scene& scene, const Plan& plan) {
     for (Material& m : scene.materials) leaveOutOfMaterial(m, out);
     for (Camera& camera : scene.cameras) {
         if (out.has(Effect::DepthOfField)) camera.lensRadius = 0;
-        if (out.has(Effect::CameraMotion)) camera.motion = {};
+        if (out.has(Effect::CameraMotion)) {
+            camera.motion = {};
+            if (camera.course) freeze(*camera.course);
+        }
     }
     if (!out.has(Effect::ObjectMotion)) return;
     for (Instance& instance : scene.instances) instance.motion = -1;
     scene.motions.clear();
+    for (Course& course : scene.courses) freeze(course);
 }
 
 }  // namespace vlx::render

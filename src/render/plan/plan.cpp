@@ -111,6 +111,31 @@ class Analysis {
         return {false, true, "all surfaces have one colour"};
     }
 
+    RecordedMotion motion() const {
+        if (scene_.shutter.frame == 0) return {false, "the picture is none of a sequence"};
+        const auto moves = [](const std::string& what, const Course& course) -> RecordedMotion {
+            return {true, what + " from frame to frame: " + course.after.cause};
+        };
+        if (camera_.course) return moves(cameraName() + " moves", *camera_.course);
+        const auto& courses = scene_.courses;
+        for (std::size_t i = 0; i < scene_.worldShapes; ++i)
+            if (const std::int32_t c = scene_.shapes[i].course; c >= 0 && reach_.seen(i))
+                return moves("something in sight moves", courses[static_cast<std::size_t>(c)]);
+        for (const Instance& instance : scene_.instances) {
+            if (instance.course < 0) continue;
+            const Group& group = scene_.groups[instance.group];
+            for (std::size_t i = group.firstShape; i < group.firstShape + group.shapes; ++i)
+                if (reach_.seen(i))
+                    return moves("something in sight moves",
+                                 courses[static_cast<std::size_t>(instance.course)]);
+        }
+        for (std::size_t i = 0; i < scene_.lights.size(); ++i)
+            if (const std::int32_t c = scene_.lights[i].course; c >= 0)
+                return moves(lightName(i) + " moves", courses[static_cast<std::size_t>(c)]);
+        return {false, courses.empty() ? "nothing moves from frame to frame"
+                                       : "nothing in sight moves from frame to frame"};
+    }
+
     std::vector<std::size_t> idleLights() const {
         std::vector<std::size_t> list;
         for (std::size_t i = 0; i < idle_.size(); ++i)
@@ -326,6 +351,7 @@ Plan planEffects(const Scene& scene, const PlanOptions& options) {
         plan.warnings.push_back("the image is biased: " + std::string(nameOf(effect)) +
                                 " left out, although " + finding.reason);
     }
+    plan.motion = analysis.motion();
     if (plan.general) return plan;
     plan.idleLights = analysis.idleLights();
     if (plan.leftOut.none()) plan.features = analysis.features();

@@ -43,6 +43,13 @@ struct RecordedFeatures {
     std::string reason;  ///< why something is not recorded; else empty
 };
 
+/// Whether the dump is to hold motion vectors: of a picture in a sequence, where the camera or something that
+/// it may see is elsewhere in a neighbouring frame.
+struct RecordedMotion {
+    bool recorded = false;
+    std::string reason;
+};
+
 /// What a picture of a scene is to simulate. Derived from the scene alone, before anything is traced, and
 /// conservative: what is not called for cannot be met by any path. What no path can meet calls for nothing:
 /// materials that nothing in reach has, surfaces out of the camera's sight where nothing in sight scatters,
@@ -54,6 +61,7 @@ struct Plan {
     EffectSet planned;
     EffectSet leftOut;  ///< called for, but not wanted: the image is biased
     RecordedFeatures features;
+    RecordedMotion motion;
     std::vector<std::size_t> idleLights;  ///< lights that reach nothing
     std::vector<std::string> warnings;
 

@@ -66,11 +66,19 @@ View::Projection View::project(const Vec3& point, Vec2 lens, float time) const {
         offset = f.lensX * d.x + f.lensY * d.y;
         distance = focusDistance_;
     }
+    return projected(f, offset, distance, normalized(point - (f.origin + offset)));
+}
+
+View::Projection View::projectFar(const Vec3& direction, float time) const {
+    return projected(frameDuring(time), {}, 1, direction);
+}
+
+View::Projection View::projected(const CameraFrame& f, const Vec3& offset, float distance,
+                                 const Vec3& direction) {
     Projection p;
     p.origin = f.origin + offset;
     // The place on the plane, corner + x dx + y dy seen from the lens, times s is the direction: Cramer's
     // rule.
-    const Vec3 direction = normalized(point - p.origin);
     const Vec3 corner = f.corner * distance - offset, dx = f.dx * distance, dy = f.dy * distance;
     const Vec3 normal = cross(dx, dy);  // its length: a pixel's area
     const float facing = dot(direction, normal), ahead = dot(corner, normal);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,12 +16,13 @@ struct Camera {
     std::string name;
     Transform toWorld;  ///< rotation and translation; in the middle of the exposure, when it moves
     Motion motion;
-    float verticalFov = 0.8f;  ///< radians
-    float aspect = 0;          ///< width / height; 0: as the image
-    float lensRadius = 0;      ///< metres; 0: pinhole
-    float focusDistance = 0;   ///< along the axis; used when lensRadius > 0
-    bool preferred = false;    ///< marked as the one to use (extras `active`)
-    std::string unusable;      ///< why it cannot be rendered from (orthographic, ...); empty when it can
+    std::optional<Course> course;  ///< where it is elsewhere in the neighbouring frames
+    float verticalFov = 0.8f;      ///< radians
+    float aspect = 0;              ///< width / height; 0: as the image
+    float lensRadius = 0;          ///< metres; 0: pinhole
+    float focusDistance = 0;       ///< along the axis; used when lensRadius > 0
+    bool preferred = false;        ///< marked as the one to use (extras `active`)
+    std::string unusable;          ///< why it cannot be rendered from (orthographic, ...); empty when it can
 };
 
 /// One sample to take: a position on the image plane, and which numbers the path uses.
@@ -53,6 +55,8 @@ class View {
     /// The inverse of ray(): the raster position whose ray, from this point of the lens, goes through
     /// `point`.
     Projection project(const Vec3& point, Vec2 lens, float time = 0) const;
+    /// Of what is at infinity in a direction of unit length, seen from the middle of the lens.
+    Projection projectFar(const Vec3& direction, float time = 0) const;
 
     bool hasLens() const { return lensRadius_ > 0; }
     bool moves() const { return frames_.size() > 1; }
@@ -74,6 +78,9 @@ class View {
     };
     CameraFrame frameAt(const Transform& toWorld) const;
     CameraFrame frameDuring(float time) const;
+    /// From a place on the lens, `offset` from its middle: of the plane at `distance` along the axis.
+    static Projection projected(const CameraFrame& frame, const Vec3& offset, float distance,
+                                const Vec3& direction);
 
     std::vector<CameraFrame> frames_;  ///< at equal steps of time, or one
     float lensRadius_;

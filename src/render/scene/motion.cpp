@@ -27,6 +27,7 @@ double distance(const Transform& a, const Transform& b) {
 }  // namespace
 
 Transform Motion::at(float time) const {
+    if (!moves()) return places.front();
     const auto steps = static_cast<float>(places.size() - 1);
     const float position = std::clamp(time, 0.f, 1.f) * steps;
     const auto first = std::min(static_cast<std::size_t>(position), places.size() - 2);
@@ -68,6 +69,19 @@ Motion followed(const std::function<Transform(double)>& placeAt) {
         if (fine || steps >= kMostSteps) return motion;
         motion.places = std::move(finer);
     }
+}
+
+bool alike(const Motion& a, const Motion& b) {
+    constexpr double kRounding = 1e-12;
+    Transform nowhere;
+    nowhere.m = {};
+    const std::size_t steps = std::max({a.places.size(), b.places.size(), std::size_t{2}}) - 1;
+    for (std::size_t i = 0; i <= steps; ++i) {
+        const float time = static_cast<float>(i) / static_cast<float>(steps);
+        const Transform there = a.at(time);
+        if (!(distance(there, b.at(time)) <= kRounding * distance(there, nowhere))) return false;
+    }
+    return true;
 }
 
 }  // namespace vlx::render

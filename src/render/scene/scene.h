@@ -42,6 +42,7 @@ struct Shape {
     std::int64_t firstTangent = -1;  ///< of the optional arrays: -1 when it has none
     std::int64_t firstSecondUv = -1;
     std::int64_t firstColour = -1;
+    std::int32_t course = -1;  ///< in world space: index into the scene's courses, or -1
 };
 
 /// Shapes of a mesh that more than one node uses: in the mesh's own space.
@@ -54,6 +55,7 @@ struct Instance {
     std::uint32_t group = 0;
     Transform toWorld;         ///< in the middle of the exposure, when it moves
     std::int32_t motion = -1;  ///< index into the scene's motions, or -1
+    std::int32_t course = -1;  ///< likewise into its courses
 };
 
 /// What was met while loading that a person may want to know.
@@ -77,6 +79,7 @@ struct Scene {
     std::vector<Group> groups;
     std::vector<Instance> instances;
     std::vector<Motion> motions;
+    std::vector<Course> courses;  ///< of a picture in a sequence (Shutter::frame): of what they move
 
     std::vector<Material> materials;
     std::vector<Texture> textures;
