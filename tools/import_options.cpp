@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "exr/flat_images.h"
 #include "tool_main.h"
 
 namespace vlx {
@@ -11,15 +12,25 @@ ChannelMap parseMappings(const std::vector<std::string>& mappings) {
     for (const auto& mapping : mappings) {
         const std::size_t sign = mapping.find('=');
         if (sign == 0 || sign == std::string::npos || sign + 1 == mapping.size())
-            throw CLI::ValidationError("--map", "expected NAME=SOURCE, found '" + mapping + "'");
-        map[mapping.substr(0, sign)] = mapping.substr(sign + 1);
+            throw CLI::ValidationError("--map",
+                                       "expected NAME=SOURCE or NAME=FACTOR*SOURCE, found '" + mapping + "'");
+        const std::string source = mapping.substr(sign + 1);
+        if (source.find('*') != std::string::npos && !parseScaled(source))
+            throw CLI::ValidationError(
+                "--map",
+                "expected NAME=FACTOR*SOURCE, FACTOR a finite number other than 0 (a source with a * in "
+                "its name: 1*SOURCE), found '" +
+                    mapping + "'");
+        map[mapping.substr(0, sign)] = source;
     }
     return map;
 }
 
 void bindMap(CLI::App& app, std::vector<std::string>& mappings) {
-    app.add_option("--map", mappings,
-                   "Take a dump's channel from an image's, for example R=Combined.R; goes before the preset")
+    app.add_option(
+           "--map", mappings,
+           "Take a dump's channel from an image's, for example R=Combined.R, or from its values times "
+           "a factor, motion.y=-1*flow.y; goes before the preset. Repeatable")
         ->type_name("NAME=SOURCE")
         ->expected(1)
         ->take_all();

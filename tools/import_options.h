@@ -9,7 +9,7 @@
 /// Options of images by other renderers, the same in vlx-pack and vlx-krige.
 namespace vlx {
 
-/// "--map NAME=SOURCE". Throws CLI::ValidationError.
+/// "--map NAME=SOURCE", "NAME=FACTOR*SOURCE". Throws CLI::ValidationError.
 ChannelMap parseMappings(const std::vector<std::string>& mappings);
 void bindMap(CLI::App& app, std::vector<std::string>& mappings);
 

@@ -71,10 +71,14 @@ struct StackCommand : ImportCommand {
             "pixel.\nRender each image with one sample a pixel, and features (albedo, normal, depth) if the "
             "renderer has them.");
         app.footer(
+            "Frames of a sequence may have motion, in pixels, y downwards: motion.x, motion.y\n"
+            "from where a point is to where it was in the frame before, motionNext.x, .y to\n"
+            "where it will be in the next. cycles takes all four from the Vector pass.\n\n"
             "Examples:\n"
             "  vlx-pack stack cycles_*.exr -o room.exr\n"
             "  vlx-pack stack 'seed_####.exr' -o room.exr --preset mitsuba\n"
-            "  vlx-pack stack a.exr b.exr -o ab.exr --map R=diffuse.r --map G=diffuse.g --map B=diffuse.b");
+            "  vlx-pack stack a.exr b.exr -o ab.exr --map R=diffuse.r --map G=diffuse.g --map B=diffuse.b\n"
+            "  vlx-pack stack 'f7_s####.exr' -o f7.exr --map motion.x=-1*flow.x --map motion.y=-1*flow.y");
         app.add_option("IMAGE", images,
                        "Flat images of equal size; #### in a name: all files with a number there")
             ->required();
@@ -82,7 +86,7 @@ struct StackCommand : ImportCommand {
         addChoice(
             app, "--preset", preset,
             {{"auto", Auto}, {"cycles", Cycles}, {"mitsuba", Mitsuba}, {"pbrt", Pbrt}, {"plain", Plain}},
-            "How channels are named. cycles: Blender's multilayer files with denoising data;\n"
+            "How channels are named. cycles: Blender's multilayer files with denoising data, and vectors;\n"
             "mitsuba: the aov integrator's; pbrt: the gbuffer film's; plain: R, G, B and a dump's own\n"
             "names; auto: what the names look like");
         bindRadiance(app, radiance);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "finished.h"
+#include "sequence/compare_sequence.h"
 #include "sweep/compare_sweep.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
@@ -127,6 +128,8 @@ radiance. Of a sample dump, its flat beauty part is read.
 Exit codes: 0 done; 1 a file cannot be read, compared or written; 2 bad usage;
 3 a limit was passed.
 
+vlx-compare sequence compares sequences frame by frame and measures how much
+they flicker: see vlx-compare sequence --help.
 vlx-compare sweep measures what accuracy costs in time and writes a report: see
 vlx-compare sweep --help.
 
@@ -275,7 +278,9 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc > 1 && std::string(argv[1]) == "sweep") return vlx::sweepMain(argc - 1, argv + 1);
+    const std::string command = argc > 1 ? argv[1] : "";
+    if (command == "sequence") return vlx::sequenceMain(argc - 1, argv + 1);
+    if (command == "sweep") return vlx::sweepMain(argc - 1, argv + 1);
     CLI::App app("Measures images against a reference: error metrics, error maps, pictures side by side.",
                  "vlx-compare");
     Options options;

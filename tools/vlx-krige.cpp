@@ -9,6 +9,7 @@
 #include <string>
 
 #include "exr/flat_header.h"
+#include "exr/flat_images.h"
 #include "finished.h"
 #include "frames.h"
 #include "import/bcd.h"
@@ -69,6 +70,12 @@ vlx::ChannelMap replacedLayers(const vlx::KrigeOptions& o, const std::string& or
     std::erase_if(map, [](const auto& entry) {
         return entry.first != "R" && entry.first != "G" && entry.first != "B" && entry.first != "A";
     });
+    for (const auto& [channel, from] : map)
+        if (vlx::parseScaled(from) && o.moments.options().map.contains(channel))
+            throw CLI::ValidationError("--map", "expected " + channel +
+                                                    " without a factor, as it is put back into its channel "
+                                                    "(--drop-layers puts nothing back), found '" +
+                                                    from + "'");
     return map;
 }
 

@@ -37,6 +37,24 @@ std::string formatted(const char* format, double value) {
     return text;
 }
 
+std::string aligned(const std::vector<std::vector<std::string>>& rows) {
+    std::vector<std::size_t> widths;
+    for (const auto& row : rows) {
+        widths.resize(std::max(widths.size(), row.size()));
+        for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+    }
+    std::string text;
+    for (const auto& row : rows) {
+        for (std::size_t i = 0; i < row.size(); ++i) {
+            const std::string space(widths[i] - row[i].size(), ' ');
+            text += i == 0 ? row[i] + space : "  " + space + row[i];
+        }
+        while (text.back() == ' ') text.pop_back();
+        text += '\n';
+    }
+    return text;
+}
+
 std::string hexText(std::uint64_t value) {
     char text[17];
     std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));

@@ -39,25 +39,6 @@ std::string cell(Metric metric, double value) {
     }
 }
 
-/// Rows of cells; the first cell of a row is flush left, the others flush right.
-std::string aligned(const std::vector<std::vector<std::string>>& rows) {
-    std::vector<std::size_t> widths;
-    for (const auto& row : rows) {
-        widths.resize(std::max(widths.size(), row.size()));
-        for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
-    }
-    std::string text;
-    for (const auto& row : rows) {
-        for (std::size_t i = 0; i < row.size(); ++i) {
-            const std::string space(widths[i] - row[i].size(), ' ');
-            text += i == 0 ? row[i] + space : "  " + space + row[i];
-        }
-        while (text.back() == ' ') text.pop_back();
-        text += '\n';
-    }
-    return text;
-}
-
 std::vector<std::string> metricRow(const Report& report, const MetricInfo& info) {
     std::optional<double> best;
     if (report.images.size() > 1 && !isCount(info.metric))

@@ -58,6 +58,31 @@ Interval geometricInterval(std::span<const double> values) {
     return {std::exp(interval.value), std::exp(interval.lower), std::exp(interval.upper), interval.count};
 }
 
+Interval ratioInterval(std::span<const double> sums, std::span<const double> counts) {
+    assert(sums.size() == counts.size());
+    double sum = 0, count = 0;
+    Interval result{kNan, kNan, kNan, 0};
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        sum += sums[i];
+        count += counts[i];
+        result.count += counts[i] > 0;
+    }
+    if (result.count == 0) return result;
+    result.value = sum / count;
+    if (result.count < 2 || !(result.value > 0)) return result;
+    double squares = 0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const double excess = sums[i] - result.value * counts[i];
+        squares += excess * excess;
+    }
+    const double n = result.count;
+    const double deviation = std::sqrt(squares * n / (n - 1)) / sum;  // of the logarithm
+    const double factor = std::exp(studentQuantile95(result.count - 1) * deviation);
+    result.lower = result.value / factor;
+    result.upper = result.value * factor;
+    return result;
+}
+
 std::optional<LineFit> fitLine(std::span<const double> x, std::span<const double> y) {
     assert(x.size() == y.size());
     if (x.size() < 2) return std::nullopt;

@@ -1,6 +1,8 @@
 #include "exr/flat_images.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
@@ -50,6 +52,22 @@ std::unique_ptr<ImageInput> openFlat(const std::string& path) {
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
     return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+std::optional<ScaledChannel> parseScaled(const std::string& text) {
+    const std::size_t star = text.find('*');
+    if (star == std::string::npos || star + 1 == text.size()) return std::nullopt;
+    ScaledChannel scaled{text.substr(star + 1)};
+    const auto [end, status] = std::from_chars(text.data(), text.data() + star, scaled.factor);
+    if (status != std::errc() || end != text.data() + star || !std::isfinite(scaled.factor) ||
+        scaled.factor == 0)
+        return std::nullopt;
+    return scaled;
+}
+
+ScaledChannel channelFor(const std::vector<std::string>& names, const std::string& source) {
+    if (contains(names, source)) return {source};
+    return parseScaled(source).value_or(ScaledChannel{source});
 }
 
 std::string partChannel(int part, const std::string& partName, const std::string& channel) {
@@ -214,8 +232,9 @@ std::optional<double> FlatImages::number(std::size_t image, const std::string& a
     return sources_[image]->info().number(attribute);
 }
 
-FlatChannel FlatImages::take(std::size_t image, const std::string& channel) {
-    return {image, sources_[image]->take(channel)};
+FlatChannel FlatImages::take(std::size_t image, const std::string& source) {
+    const ScaledChannel channel = channelFor(channels(image), source);
+    return {image, sources_[image]->take(channel.name), channel.factor};
 }
 
 int FlatImages::bandRows(std::size_t values) const {
@@ -230,7 +249,7 @@ void FlatImages::read(int y, int rows) {
 }
 
 float FlatImages::value(FlatChannel channel, std::size_t pixel) const {
-    return sources_[channel.image]->value(pixel, channel.index);
+    return channel.factor * sources_[channel.image]->value(pixel, channel.index);
 }
 
 std::uint64_t FlatImages::hash(std::size_t image) const { return sources_[image]->hash(); }

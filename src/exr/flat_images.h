@@ -23,10 +23,25 @@ bool contains(const std::vector<std::string>& names, const std::string& name);
 /// before it in others, unless it begins with it.
 std::string partChannel(int part, const std::string& partName, const std::string& channel);
 
+/// A channel, its values multiplied by a factor.
+struct ScaledChannel {
+    std::string name;
+    float factor = 1;
+};
+
+/// Of "FACTOR*NAME", for example -1*flow.y: up to the first '*' stands a finite number other than 0. Nothing
+/// for any other text.
+std::optional<ScaledChannel> parseScaled(const std::string& text);
+
+/// What `source` stands for in an image of the channels `names`: the channel of this very name, else
+/// parseScaled(), else a channel that is not there.
+ScaledChannel channelFor(const std::vector<std::string>& names, const std::string& source);
+
 /// A channel of one of a set of images.
 struct FlatChannel {
     std::size_t image = 0;
     std::size_t index = 0;  ///< among the channels taken from that image
+    float factor = 1;       ///< of its values
 };
 
 /// Channels of flat images of equal windows, read by bands of rows: what importers take samples from. Files
@@ -48,8 +63,9 @@ class FlatImages {
     /// Number attribute of an image.
     std::optional<double> number(std::size_t image, const std::string& attribute) const;
 
-    /// From now on, read() reads this channel too. Throws Error when the image has no such channel.
-    FlatChannel take(std::size_t image, const std::string& channel);
+    /// From now on, read() reads this channel too (channelFor). Throws Error when the image has no such
+    /// channel.
+    FlatChannel take(std::size_t image, const std::string& source);
 
     /// Rows a band may have so that `values` floats a pixel stay within a fixed memory.
     int bandRows(std::size_t values) const;

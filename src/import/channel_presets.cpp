@@ -24,6 +24,16 @@ ChannelMap cyclesMap(const Names& names, const std::string& layer) {
         take(std::string("albedo.") + c, std::string("Denoising Albedo.") + c);
     for (const char* c : {"X", "Y", "Z"}) take(std::string("N.") + c, std::string("Denoising Normal.") + c);
     for (const char* pass : {"Denoising Depth.Z", "Denoising Depth.V", "Depth.Z", "Depth.V"}) take("Z", pass);
+    // In pixels, y upwards: (X, Y) to where the point was in the frame before, (Z, W) from where it will be
+    // in the next.
+    const auto takeMotion = [&](std::size_t i, const std::string& sign, const std::string& end) {
+        if (contains(names, layer + "Vector." + end))
+            map[std::string(kMotionChannels[i])] = sign + layer + "Vector." + end;
+    };
+    takeMotion(0, "", "X");
+    takeMotion(1, "-1*", "Y");
+    takeMotion(2, "-1*", "Z");
+    takeMotion(3, "", "W");
     return map;
 }
 
@@ -31,6 +41,8 @@ ChannelMap plainMap(const Names& names) {
     ChannelMap map;
     for (const auto& channel : standardChannels())
         if (channel.name != kReplicate && contains(names, channel.name)) map[channel.name] = channel.name;
+    for (const std::string_view channel : kMotionChannels)
+        if (contains(names, std::string(channel))) map[std::string(channel)] = channel;
     if (!findTriple(names, {""})) enter(map, "", findLuminance(names, {""}));
     return map;
 }

@@ -11,7 +11,8 @@
 namespace vlx {
 
 /// Which channels of an image hold what: dump channel -> image channel, for example {"albedo.R",
-/// "ViewLayer.Denoising Albedo.R"}. Values are taken as they are.
+/// "ViewLayer.Denoising Albedo.R"}. Values are taken as they are, or times a factor: {"motion.y",
+/// "-1*flow.y"}.
 using ChannelMap = std::map<std::string, std::string>;
 
 /// What an importer did, for a person to check. Every importer returns one.

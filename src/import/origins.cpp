@@ -52,9 +52,10 @@ void describe(const FlatImages& images, const Origins& origins, std::size_t own,
     for (const auto& [name, origin] : origins)
         report.mapped[name] =
             origin.image < own ? origin.channel : images.path(origin.image) + " " + origin.channel;
-    for (const auto& name : images.channels(0))
+    const Names& names = images.channels(0);
+    for (const auto& name : names)
         if (std::none_of(origins.begin(), origins.end(), [&](const auto& entry) {
-                return entry.second.image < own && entry.second.channel == name;
+                return entry.second.image < own && channelFor(names, entry.second.channel).name == name;
             }))
             report.ignored.push_back(name);
 }

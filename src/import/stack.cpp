@@ -1,11 +1,14 @@
 #include "import/stack.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 
 #include "exr/flat_images.h"
 #include "import/channel_presets.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/writer.h"
 
 namespace vlx {
@@ -13,6 +16,50 @@ namespace vlx {
 namespace {
 
 constexpr char kReplicate[] = "sample.replicate";
+
+// The dump's channels but for its replicates', motion whole or not at all: readers ask for all of it.
+std::vector<DumpChannel> stackChannels(const ChannelMap& map) {
+    std::vector<DumpChannel> channels = dumpChannels(map, true);
+    const auto mapped = [&](std::string_view name) { return map.contains(std::string(name)); };
+    if (std::any_of(std::begin(kMotionChannels), std::end(kMotionChannels), mapped))
+        for (const std::string_view name : kMotionChannels)
+            if (!mapped(name)) channels.push_back({std::string(name), ChannelType::Float});
+    return channels;
+}
+
+// Cycles writes the motion of surfaces, and leaves 0 where a camera ray meets none: of a sky that a moving
+// camera sees that is wrong, of what else it may be (a pane before it) not known either. Returns of how many
+// samples.
+std::int64_t forgetMotionOfMisses(SampleBand& band) {
+    std::vector<std::vector<float>*> motion;
+    for (const std::string_view name : kMotionChannels)
+        if (const int c = band.channel(std::string(name)); c >= 0)
+            motion.push_back(&band.values[static_cast<std::size_t>(c)]);
+    const int depth = band.channel("Z");
+    if (motion.empty() || depth < 0) return 0;
+    std::int64_t count = 0;
+    for (std::size_t s = 0; s < band.samples(); ++s) {
+        const auto still = [&](const auto* values) { return (*values)[s] == 0 || std::isnan((*values)[s]); };
+        if (band.values[static_cast<std::size_t>(depth)][s] != 0 ||
+            !std::all_of(motion.begin(), motion.end(), still))
+            continue;
+        for (auto* values : motion) (*values)[s] = std::numeric_limits<float>::quiet_NaN();
+        ++count;
+    }
+    return count;
+}
+
+void noteMotion(const ChannelMap& map, std::int64_t unknown, std::vector<std::string>& notes) {
+    std::vector<std::string> missing;
+    for (const std::string_view name : kMotionChannels)
+        if (!map.contains(std::string(name))) missing.emplace_back(name);
+    if (missing.size() == std::size(kMotionChannels)) return;
+    if (!missing.empty())
+        notes.push_back("The images say nothing about " + listed(missing) + ": not known (NaN) anywhere.");
+    if (unknown > 0)
+        notes.push_back("The motion of " + std::to_string(unknown) +
+                        " samples is not known: Cycles leaves out what is no surface.");
+}
 
 // What the preset could not find, or takes in the renderer's own sense.
 void notePreset(StackPreset preset, const ChannelMap& map, std::vector<std::string>& notes) {
@@ -43,18 +90,19 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
     DumpHeader header;
     header.data = sources.data();
     header.display = sources.display();
-    header.channels = dumpChannels(report.mapped, true);
+    header.channels = stackChannels(report.mapped);
     header.compression = options.compression;
     header.renderer = options.renderer.empty() ? sources.text(0, "Software") : options.renderer;
     header.samples = static_cast<double>(images.size());
 
     Names taken;
-    std::vector<std::vector<FlatChannel>> channels;  // of each dump channel: of each image
+    std::vector<std::vector<FlatChannel>> channels;  // of each dump channel: of each image, if of any
     for (const auto& channel : header.channels) {
         auto& ofImages = channels.emplace_back();
-        if (channel.name == kReplicate) continue;
-        taken.push_back(report.mapped.at(channel.name));
-        for (std::size_t i = 0; i < sources.size(); ++i) ofImages.push_back(sources.take(i, taken.back()));
+        const auto source = report.mapped.find(channel.name);
+        if (source == report.mapped.end()) continue;
+        taken.push_back(channelFor(sources.channels(0), source->second).name);
+        for (std::size_t i = 0; i < sources.size(); ++i) ofImages.push_back(sources.take(i, source->second));
     }
     for (const auto& name : sources.channels(0))
         if (!contains(taken, name)) report.ignored.push_back(name);
@@ -62,7 +110,7 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
     setInputs(header, options.inputs);
     DumpWriter writer(dump, header);
     const int bandRows = sources.bandRows(header.channels.size() * images.size());
-    std::int64_t misses = 0;
+    std::int64_t misses = 0, motionless = 0;
     for (int row = 0; row < header.data.height;) {
         const int rows = std::min(bandRows, header.data.height - row);
         sources.read(header.data.y + row, rows);
@@ -77,13 +125,16 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
             band.channels.push_back(name);
             auto& values = band.values.emplace_back();
             values.reserve(band.samples());
-            const bool replicate = name == kReplicate;
+            const float unknown = std::numeric_limits<float>::quiet_NaN();
             for (std::size_t p = 0; p < band.pixels(); ++p)
                 for (std::size_t i = 0; i < sources.size(); ++i)
-                    values.push_back(replicate ? static_cast<float>(i) : sources.value(channels[c][i], p));
+                    values.push_back(name == kReplicate    ? static_cast<float>(i)
+                                     : channels[c].empty() ? unknown
+                                                           : sources.value(channels[c][i], p));
             if (name == "Z")
                 for (float& z : values) misses += cleanDepth(z) ? 1 : 0;
         }
+        if (chosen.preset == StackPreset::Cycles) motionless += forgetMotionOfMisses(band);
         writer.write(std::move(band));
         row += rows;
         if (progress) progress(row, header.data.height);
@@ -98,6 +149,7 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
         notes.push_back(std::to_string(misses) +
                         " samples had a depth that is negative, not finite, or 1e9 and more (nothing hit): "
                         "their Z is 0.");
+    noteMotion(report.mapped, motionless, notes);
     notePreset(chosen.preset, report.mapped, notes);
     std::map<std::uint64_t, std::string> seen;
     for (std::size_t i = 0; i < sources.size(); ++i) {

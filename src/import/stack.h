@@ -12,11 +12,12 @@ enum class StackPreset {
     Auto,     ///< Cycles when a layer has a Combined pass; pbrt and Mitsuba by channels only they have; else
               ///< Plain
     Cycles,   ///< Blender's multilayer files: of the first layer L that has it, L.Combined -> R G B A,
-              ///< L.Denoising Albedo -> albedo, L.Denoising Normal -> N, L.Denoising Depth (or L.Depth) -> Z
+              ///< L.Denoising Albedo -> albedo, L.Denoising Normal -> N, L.Denoising Depth (or L.Depth) -> Z,
+              ///< L.Vector -> motion, motionNext (where something was hit)
     Mitsuba,  ///< Mitsuba 3's aov integrator: R G B A (of the film or the first nested integrator); the AOVs
               ///< named after what they are: albedo, normals or nn or sh_normal -> N; *.T -> Z
     Pbrt,     ///< pbrt-v4's gbuffer film: R G B, Albedo -> albedo, Ns -> N. It has no distance and no alpha
-    Plain,    ///< R, G, B and the names of standardChannels(), as they are
+    Plain,    ///< R, G, B and the names of standardChannels() and kMotionChannels, as they are
 };
 
 struct StackOptions {
@@ -32,9 +33,10 @@ struct StackOptions {
 /// Joins flat images of the same view, rendered with different seeds, into a dump of one sample an image a
 /// pixel, in the order given. Every image gets its own sample.replicate, its number from 0: different seeds
 /// are independent. Z becomes 0 where it says that nothing was hit (not finite, negative, or 1e9 and more).
-/// There are no positions, unless the images have channels for them. Works by bands of rows: the memory is
-/// that of a few rows of all images. Throws Error when an image cannot be read, has other windows than the
-/// first, or lacks a mapped channel (naming the file and the channels it has), and as DumpWriter.
+/// There are no positions, unless the images have channels for them. Of kMotionChannels there are all or
+/// none: those that the images do not have are NaN, not known. Works by bands of rows: the memory is that of
+/// a few rows of all images. Throws Error when an image cannot be read, has other windows than the first, or
+/// lacks a mapped channel (naming the file and the channels it has), and as DumpWriter.
 ImportReport stackImages(const std::vector<std::string>& images, const std::string& dump,
                          const StackOptions& options, const Progress& progress = {});
 

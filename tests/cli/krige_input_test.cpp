@@ -230,6 +230,8 @@ TEST_F(Input, MessagesNameTheOptionThatHelps) {
     ends({arnold}, 1, "(--variance-is mean)");
     ends({arnold, "--samples", "4"}, 0, "");
     ends({arnold, "--variance-is", "mean"}, 0, "taken for Arnold's");
+    ends({arnold, "--variance-is", "mean", "--map", "R=2*G"}, 2, "--map: expected R without a factor");
+    ends({arnold, "--variance-is", "mean", "--map", "R=2*G", "--drop-layers"}, 0, "");
     const std::string unknown = write("unknown.exr", {"R", "G", "B", "var.R", "var.G", "var.B"});
     ends({unknown}, 1, "--variance-is sample, mean or second-moment");
     ends({write("depth.exr", {"Z"})}, 1, "--map R=CHANNEL");

@@ -120,6 +120,7 @@ TEST(NumbersThatAreNotFinite, AreBadUsageOfEveryOption) {
         {"vlx-compare", {"none.exr", "none.exr", "--pictures", "out"}, {"--crop"}, "0,0,1,#"},
         {"vlx-compare", {"none.exr", "none.exr"}, {"--fail-above"}, "mse=#"},
         {"vlx-compare", {"none.exr", "none.exr"}, {"--fail-below"}, "psnr=#"},
+        {"vlx-compare", {"sequence", "none_#.exr", "none_#.exr"}, {"--threads", "--frames"}},
         {"vlx-compare", {"sweep", "none.glb", "-o", "out"}, {"--hierarchical", "--trace-seconds", "--spp"}},
         {"vlx-compare", {"sweep", "none.glb", "-o", "out"}, {"--seeds", "--width", "--detail-spp"}},
         {"vlx-compare", {"sweep", "none.glb", "-o", "out"}, {"--target"}, "relmse=#"},

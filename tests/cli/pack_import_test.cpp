@@ -41,6 +41,8 @@ TEST(VlxPackImport, EachCommandSaysWhatItTookAndWhatIsMissing) {
     const Sources s;
     const std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>> cases = {
         {{"stack", s.folder / "a_####.exr", "-o", s.out}, {"2 images", "R from R", "lacks albedo"}},
+        {{"stack", s.folder / "a_####.exr", "-o", s.out, "--map", "motion.x=-1*G", "--map", "motion.y=0.5*B"},
+         {"motion.x from -1*G", "motion.y from 0.5*B", "nothing about motionNext.x, motionNext.y"}},
         {{"buffers", s.folder / "a_0001.exr", s.folder / "a_0002.exr", "-o", s.out},
          {"two half-buffers", "lacks variances"}},
         {{"moments", s.folder / "mse.exr", "-o", s.out},
@@ -71,6 +73,12 @@ TEST(VlxPackImport, BadUsageAndFailures) {
           {"moments", image, "-o", s.out, "--samples", "0"},
           {"moments", image, "-o", image},
           {"moments", image, "-o", s.out, "--map", "R"},
+          {"stack", image, "-o", s.out, "--map", "Z=x*G"},
+          {"stack", image, "-o", s.out, "--map", "Z=*G"},
+          {"stack", image, "-o", s.out, "--map", "Z=2*"},
+          {"stack", image, "-o", s.out, "--map", "Z=0*G"},
+          {"stack", image, "-o", s.out, "--map", "Z=nan*G"},
+          {"stack", image, "-o", s.out, "--map", "Z=1e99*G"},
           {"buffers", image, "-o", s.out},
           {"bcd", raw, "-o", s.out, "--samples", "4"},
           {"bcd", raw, "-o", s.out, "--single"},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "compare/constants.h"
 
@@ -51,6 +52,45 @@ TEST(GeometricInterval, IsSymmetricAsARatio) {
     EXPECT_NEAR(i.upper / i.value, i.value / i.lower, 1e-6 * i.upper);
     // Where there is no logarithm it is the plain mean.
     EXPECT_DOUBLE_EQ(geometricInterval(std::array{0.0, 4.0}).value, 2);
+}
+
+TEST(RatioInterval, KnownValues) {
+    // Sums of 10 and 30 about 20 each: the logarithm's standard error is sqrt(2 / 1 * (100 + 100)) / 40 =
+    // 0.5.
+    const Interval i = ratioInterval(std::array{10.0, 30.0}, std::array{10.0, 10.0});
+    EXPECT_DOUBLE_EQ(i.value, 2);
+    EXPECT_EQ(i.count, 2);
+    EXPECT_NEAR(std::log(i.upper / i.value), 0.5 * studentQuantile95(1), 1e-12);
+    EXPECT_NEAR(i.upper / i.value, i.value / i.lower, 1e-9 * i.upper);
+    // Blocks of one mean, of whatever size, leave no doubt; empty ones say nothing.
+    const Interval sure = ratioInterval(std::array{3.0, 0.0, 6.0}, std::array{1.0, 0.0, 2.0});
+    EXPECT_DOUBLE_EQ(sure.value, 3);
+    EXPECT_DOUBLE_EQ(sure.lower, 3);
+    EXPECT_DOUBLE_EQ(sure.upper, 3);
+    EXPECT_EQ(sure.count, 2);
+    EXPECT_TRUE(std::isnan(ratioInterval(std::array{3.0, 0.0}, std::array{1.0, 0.0}).lower));
+    EXPECT_EQ(ratioInterval(std::array{0.0, 0.0}, std::array{1.0, 1.0}).value, 0);
+    EXPECT_TRUE(std::isnan(ratioInterval(std::array{0.0}, std::array{0.0}).value));
+}
+
+TEST(RatioInterval, HoldsTheMeanInNinetyFivePercent) {
+    // Blocks of different sizes whose means vary by a factor, as noise does over a picture.
+    std::mt19937 random(11);
+    std::lognormal_distribution<double> mean(0, 0.5);
+    constexpr int kTrials = 5000, kBlocks = 64;
+    const double truth = std::exp(0.125);
+    int inside = 0;
+    for (int t = 0; t < kTrials; ++t) {
+        std::vector<double> sums, counts;
+        for (int b = 0; b < kBlocks; ++b) {
+            counts.push_back(b % 8 == 7 ? 100 : 256);
+            sums.push_back(counts.back() * mean(random));
+        }
+        const Interval i = ratioInterval(sums, counts);
+        inside += i.lower <= truth && truth <= i.upper;
+    }
+    // Binomial standard deviation: 0.003; the distribution is skewed.
+    EXPECT_NEAR(static_cast<double>(inside) / kTrials, 0.95, 0.015);
 }
 
 TEST(FitLine, ExactLineAndTooFewPoints) {

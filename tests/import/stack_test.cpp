@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -71,6 +72,89 @@ TEST(Stack, CyclesImagesBecomeSamples) {
     EXPECT_EQ(report.mapped.at("R"), "L.Combined.R");
     EXPECT_EQ(report.mapped.at("Z"), "L.Denoising Depth.Z");
     EXPECT_EQ(report.ignored, (std::vector<std::string>{"L.Mist.Z", "M.Combined.R"}));
+}
+
+TEST(Stack, CyclesVectorsBecomeMotion) {
+    const TemporaryFolder folder;
+    std::vector<std::string> channels = kCycles;
+    for (const char* c : {"X", "Y", "Z", "W"}) channels.push_back(std::string("L.Vector.") + c);
+    const auto images = writeImages(folder, 3, channels);
+    const ImportReport report = stackImages(images, folder / "dump.exr", {});
+    EXPECT_EQ(report.mapped.at("motion.y"), "-1*L.Vector.Y");
+    EXPECT_EQ(report.ignored, (std::vector<std::string>{"L.Mist.Z", "M.Combined.R"}));
+    const SampleBand band =
+        DumpReader(folder / "dump.exr")
+            .read(kStacked.y, 1, {"motion.x", "motion.y", "motionNext.x", "motionNext.y"});
+    const float signs[] = {1, -1, -1, 1};
+    for (std::size_t s = 0; s < band.samples(); ++s)
+        for (std::size_t k = 0; k < 4; ++k)
+            ASSERT_EQ(band.values[k][s], signs[k] * valueOf(static_cast<int>(s % 3), 13 + static_cast<int>(k),
+                                                            static_cast<int>(s / 3), 0));
+}
+
+TEST(Stack, MotionOfWhatCyclesDidNotHitIsNotKnown) {
+    const TemporaryFolder folder;
+    const std::vector<std::string> channels = {"L.Combined.R", "L.Combined.G", "L.Combined.B", "L.Depth.Z",
+                                               "L.Vector.X",   "L.Vector.Y",   "L.Vector.Z",   "L.Vector.W"};
+    std::vector<std::string> images;
+    // Sky; a pane before the sky, which has no depth but moves; a wall that stands still.
+    for (const auto& [z, x] : {std::pair{1e10f, 0.0f}, {0.0f, 2.0f}, {3.0f, 0.0f}}) {
+        Image image({0, 0, 1, 1}, channels);
+        image.at(0, 0)[3] = z;
+        image.at(0, 0)[4] = x;
+        images.push_back(folder / ("z" + std::to_string(images.size()) + ".exr"));
+        writeImage(images.back(), image);
+    }
+    const ImportReport report = stackImages(images, folder / "dump.exr", {});
+    const SampleBand band = DumpReader(folder / "dump.exr").read(0, 1, {"motion.x", "motionNext.y"});
+    for (const auto& values : band.values) {
+        EXPECT_TRUE(std::isnan(values[0]));
+        EXPECT_FALSE(std::isnan(values[1]));
+        EXPECT_EQ(values[2], 0);
+    }
+    EXPECT_EQ(band.values[0][1], 2);
+    EXPECT_TRUE(std::any_of(report.notes.begin(), report.notes.end(), [](const std::string& note) {
+        return note.starts_with("The motion of 1 samples is not known");
+    }));
+}
+
+TEST(Stack, AFactorScalesWhatIsMapped) {
+    const TemporaryFolder folder;
+    const auto images = writeImages(folder, 2, {"R", "G", "B", "flow.x", "flow.y", "2*flow.x"});
+    StackOptions options;
+    options.map = {{"motion.x", "-0.5*flow.x"}, {"motion.y", "-1*flow.y"}, {"same", "2*flow.x"}};
+    const ImportReport report = stackImages(images, folder / "dump.exr", options);
+    EXPECT_EQ(report.mapped.at("motion.x"), "-0.5*flow.x");
+    EXPECT_TRUE(report.ignored.empty());
+    const SampleBand band =
+        DumpReader(folder / "dump.exr").read(kStacked.y, 1, {"motion.x", "motion.y", "same"});
+    for (std::size_t s = 0; s < band.samples(); ++s) {
+        const int image = static_cast<int>(s % 2), col = static_cast<int>(s / 2);
+        ASSERT_EQ(band.values[0][s], -0.5f * valueOf(image, 3, col, 0));
+        ASSERT_EQ(band.values[1][s], -valueOf(image, 4, col, 0));
+        ASSERT_EQ(band.values[2][s], valueOf(image, 5, col, 0));  // a channel of this very name
+    }
+    options.map = {{"motion.x", "-1*wind"}};
+    EXPECT_NE(errorOf([&] {
+                  stackImages(images, folder / "dump.exr", options);
+              }).find("expected a channel wind, found R, G, B"),
+              std::string::npos);
+}
+
+TEST(Stack, MotionIsThereWholeOrNotAtAll) {
+    const TemporaryFolder folder;
+    const auto images = writeImages(folder, 2, {"R", "G", "B", "motion.x", "motion.y"});
+    const ImportReport report = stackImages(images, folder / "dump.exr", {});
+    const SampleBand band =
+        DumpReader(folder / "dump.exr")
+            .read(kStacked.y, 1, {"motion.x", "motion.y", "motionNext.x", "motionNext.y"});
+    for (std::size_t s = 0; s < band.samples(); ++s) {
+        ASSERT_EQ(band.values[0][s], valueOf(static_cast<int>(s % 2), 3, static_cast<int>(s / 2), 0));
+        ASSERT_TRUE(std::isnan(band.values[2][s]) && std::isnan(band.values[3][s]));
+    }
+    EXPECT_TRUE(std::any_of(report.notes.begin(), report.notes.end(), [](const std::string& note) {
+        return note.starts_with("The images say nothing about motionNext.x, motionNext.y");
+    }));
 }
 
 TEST(Stack, MapGoesBeforeThePreset) {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Opens reports of `vlx-compare sweep` in headless Chromium and uses them.
+"""Opens reports of `vlx-compare sweep` and `sequence` in headless Chromium and uses them.
 
     report_test.py REPORT.html [--screenshots FOLDER]
     report_test.py --bin FOLDER --testdata FOLDER      makes small reports first, with and without a reference
@@ -187,11 +187,56 @@ def use(browser, url, screenshots):
         check(region() != old, "a click chooses a region")
         check(browser.run("return document.getElementById('region').textContent.includes('condition');"), "its condition number is told")
         browser.keys("#regions", ENTER)
+    look(browser, url, screenshots, "")
 
+
+def use_sequence(browser, url, screenshots):
+    """The page of `vlx-compare sequence`."""
+    browser.open(url)
+    ready = lambda: browser.run("return document.documentElement.dataset.ready === 'yes' && asked === drawn;")
+    for _ in range(100):
+        if ready():
+            break
+        time.sleep(.1)
+    check(ready(), "the page becomes ready")
+    check(browser.run("return document.querySelectorAll('#by-frame .mark').length;") == 6, "the chart has a point a frame and sequence")
+    check(browser.run("return document.querySelectorAll('#player canvas').length;") == 3, "the reference and two sequences are shown")
+    check(browser.run("return /NaN|undefined|null/.test(document.body.innerText);") is False, "no NaN or undefined is shown")
+    check(browser.run("return [...document.querySelectorAll('svg path')].every(p => !p.getAttribute('d').includes('NaN'));"),
+          "no chart line has a NaN")
+    chart = browser.run("return document.getElementById('by-frame').innerHTML;")
+    browser.run("const s = document.getElementById('measure'); s.selectedIndex = 1; s.dispatchEvent(new Event('change'));")
+    check(browser.run("return document.getElementById('by-frame').innerHTML;") != chart, "the measure can be chosen")
+    browser.run("document.querySelector('.legend button').click();")
+    check(browser.run("return document.querySelectorAll('#by-frame .mark').length;") == 2, "the legend hides a sequence")
+    browser.run("document.querySelector('.legend button').click();")
+
+    shown = lambda: browser.run("while (asked !== drawn) await new Promise(r => setTimeout(r, 20));"
+                                "return sources.map((s) => s.canvas.toDataURL()).join();")
+    first = shown()
+    browser.run("const f = document.getElementById('frame'); f.value = 1; f.dispatchEvent(new Event('input'));")
+    second = shown()
+    check(second != first and browser.run("return document.getElementById('frame-value').textContent;") == "8", "a frame can be chosen")
+    for control, value, event in (("view", "signed", "change"), ("view", "relative", "change"), ("view", "radiance", "change"), ("exposure", 2, "input")):
+        before = shown()
+        browser.run("const c = document.getElementById(arguments[0]); c.value = arguments[1]; c.dispatchEvent(new Event(arguments[2]));", control, value, event)
+        check(shown() != before, f"{control} {value} acts")
+    frames = browser.run("document.getElementById('speed').value = 50; document.getElementById('play').click(); const seen = new Set();"
+                         "for (let i = 0; i < 200 && seen.size < 3; ++i) { seen.add(document.getElementById('frame-value').textContent); await new Promise(r => setTimeout(r, 5)); }"
+                         "document.getElementById('play').click(); return seen.size;")
+    check(frames == 3, "it plays all frames")
+    stopped = shown()
+    time.sleep(.2)
+    check(shown() == stopped and browser.run("return document.getElementById('play').textContent;") == "Play", "and stops")
+    look(browser, url, screenshots, "sequence_")
+
+
+def look(browser, url, screenshots, name):
+    """What every page must be."""
     # Nothing wider than the window but what scrolls in itself.
     check(browser.run("return document.documentElement.scrollWidth <= window.innerWidth;"), "the page is not wider than the window")
     if screenshots:
-        browser.screenshot(os.path.join(screenshots, "light.png"))
+        browser.screenshot(os.path.join(screenshots, name + "light.png"))
     browser.cdp("Emulation.setDeviceMetricsOverride", {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True})
     check(browser.run("return document.documentElement.scrollWidth <= 390;"), "nor than a telephone's")
     browser.cdp("Emulation.clearDeviceMetricsOverride", {})
@@ -199,12 +244,12 @@ def use(browser, url, screenshots):
     dark = browser.run("return getComputedStyle(document.body).backgroundColor;")
     check(sum(int(v) for v in dark[4:-1].split(",")) < 150, "dark when the reader prefers dark")
     if screenshots:
-        browser.screenshot(os.path.join(screenshots, "dark.png"))
+        browser.screenshot(os.path.join(screenshots, name + "dark.png"))
     browser.cdp("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "light"}]})
     pdf = base64.b64decode(browser.call("POST", browser.session + "/print", {"background": True}))
     check(pdf.startswith(b"%PDF") and len(pdf) > 20000, "it prints")
     if screenshots:
-        pathlib.Path(screenshots, "print.pdf").write_bytes(pdf)
+        pathlib.Path(screenshots, name + "print.pdf").write_bytes(pdf)
 
     messages = browser.logs("browser")
     check(not messages, f"the console is empty {messages[:3]}")
@@ -224,7 +269,21 @@ def make_reports(programs, testdata, folder):
                             "--external", "broken=exit 4; {input} {output}", "--target", "relmse=100"],
                    stdout=subprocess.DEVNULL)  # exit code 1: one method fails, and is to be shown failing
     subprocess.run(sweep + ["-o", folder + "/without", "--no-vary"], check=True)
-    return [folder + "/with/report.html", folder + "/without/report.html"]
+    return [folder + "/with/report.html", folder + "/without/report.html", make_sequence(programs, dump, reference, folder)]
+
+
+def make_sequence(programs, dump, reference, folder):
+    """Three frames of the test dump, of two samples a pixel each, by two methods."""
+    for frame in (7, 8, 9):
+        shutil.copy(reference, f"{folder}/ref_{frame}.exr")
+        samples = f"{folder}/samples_{frame}.exr"
+        subprocess.run([os.path.join(programs, "vlx-pack"), "subset", dump, "-o", samples, "--samples", "2", "--part", str(frame - 6), "--quiet"], check=True)
+        for method in ("mean", "gaussian"):
+            subprocess.run([os.path.join(programs, "vlx-krige"), samples, "-o", f"{folder}/{method}_{frame}.exr", "--method", method, "--quiet"], check=True)
+    page = folder + "/sequence.html"
+    subprocess.run([os.path.join(programs, "vlx-compare"), "sequence", folder + "/ref_#.exr", folder + "/mean_#.exr", folder + "/gaussian_#.exr",
+                    "--report", page, "--quiet"], check=True)
+    return page
 
 
 def main():
@@ -242,7 +301,8 @@ def main():
             print(report)
             browser = Browser()
             try:
-                use(browser, pathlib.Path(report).resolve().as_uri(), arguments.screenshots)
+                look_at = use_sequence if report.endswith("sequence.html") else use
+                look_at(browser, pathlib.Path(report).resolve().as_uri(), arguments.screenshots)
             finally:
                 browser.close()
     print(f"{len(failures)} failed")

@@ -1,14 +1,11 @@
 #include "sweep/sweep_page.h"
 
-#include <Imath/half.h>
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
 
-#include "sweep/page_files.h"
+#include "page/page.h"
 #include "sweep/sweep_json.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
@@ -16,59 +13,11 @@
 
 namespace vlx {
 
+extern const PageSources kSweepPage;
+
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-/// Too large becomes the largest finite half, because error views subtract; NaN stays NaN.
-std::uint16_t halfOf(float value) {
-    constexpr auto kMost = static_cast<float>(HALF_MAX);
-    return imath_float_to_half(std::clamp(value, -kMost, kMost));
-}
-
-std::string base64(const std::vector<unsigned char>& bytes) {
-    constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string text;
-    text.reserve(bytes.size() / 3 * 4 + 4);
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-        std::uint32_t word = 0;
-        for (std::size_t k = 0; k < 3; ++k) word = (word << 8) | (k < count ? bytes[i + k] : 0u);
-        for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[(word >> (18 - 6 * k)) & 63] : '=';
-    }
-    return text;
-}
-
-/// Halves, high bytes before low ones (which deflates better), deflated, base64.
-std::string packed(const std::vector<float>& values) {
-    std::vector<unsigned char> bytes(2 * values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        const std::uint16_t half = halfOf(values[i]);
-        bytes[i] = static_cast<unsigned char>(half >> 8);
-        bytes[values.size() + i] = static_cast<unsigned char>(half & 255);
-    }
-    uLongf size = compressBound(static_cast<uLong>(bytes.size()));
-    std::vector<unsigned char> deflated(size);
-    if (compress2(deflated.data(), &size, bytes.data(), static_cast<uLong>(bytes.size()), 6) != Z_OK)
-        throw Error("", "zlib failed to compress an image");
-    deflated.resize(size);
-    return base64(deflated);
-}
-
-/// The image reduced by a whole factor, channel by channel: all of R, then G, then B.
-std::vector<float> planes(const Image& image, int factor) {
-    const int width = image.data.width / factor, height = image.data.height / factor;
-    std::vector<float> result;
-    for (int c = 0; c < image.channelCount(); ++c)
-        for (int row = 0; row < height; ++row)
-            for (int col = 0; col < width; ++col) {
-                double sum = 0;
-                for (int y = 0; y < factor; ++y)
-                    for (int x = 0; x < factor; ++x) sum += image.at(col * factor + x, row * factor + y)[c];
-                result.push_back(static_cast<float>(sum / (factor * factor)));
-            }
-    return result;
-}
 
 /// Root of the mean variance of the colours.
 Image meanDeviation(const Image& stddev) {
@@ -83,22 +32,11 @@ Image meanDeviation(const Image& stddev) {
 
 Json imageJson(const std::string& path) {
     const Image image = readImage(path);
-    const Image colour = colourOf(image, path);
-    const Window& window = image.data;
-    const int factor = (std::max(window.width, window.height) + kPageImageSide - 1) / kPageImageSide;
-    Json json = {{"x", window.x},
-                 {"y", window.y},
-                 {"width", window.width / factor},
-                 {"height", window.height / factor},
-                 {"factor", factor},
-                 {"radiance", packed(planes(colour, factor))}};
+    const int factor = pageImageFactor(image.data);
+    Json json = pageImage(colourOf(image, path), factor);
     if (hasLayer(image, "stddev"))
-        json["stddev"] = packed(planes(meanDeviation(colourOf(image, path, "stddev")), factor));
+        json["stddev"] = packedPlanes(meanDeviation(colourOf(image, path, "stddev")), factor);
     return json;
-}
-
-Json toJson(const Interval& i) {
-    return {numberJson(i.value), numberJson(i.lower), numberJson(i.upper), i.count};
 }
 
 template <typename Value>
@@ -108,9 +46,9 @@ Json mapJson(const std::map<std::string, Value>& map) {
         if constexpr (std::is_same_v<Value, double>)
             json[name] = numberJson(value);
         else if constexpr (std::is_same_v<Value, SweepSetting::Ratio>)
-            json[name] = {{"ratio", toJson(value.ratio)}, {"extrapolated", value.extrapolated}};
+            json[name] = {{"ratio", intervalJson(value.ratio)}, {"extrapolated", value.extrapolated}};
         else
-            json[name] = toJson(value);
+            json[name] = intervalJson(value);
     }
     return json;
 }
@@ -121,10 +59,10 @@ Json settingJson(const Sweep& sweep, const SweepSetting& s) {
                  {"hierarchical", s.sampling.hierarchical},
                  {"setting", s.sampling.setting},
                  {"samplesPerPixel", s.samplesPerPixel},
-                 {"seconds", toJson(s.seconds)},
-                 {"samplingSeconds", toJson(s.samplingSeconds)},
-                 {"imageSeconds", toJson(s.imageSeconds)},
-                 {"cpuSeconds", toJson(s.cpuSeconds)},
+                 {"seconds", intervalJson(s.seconds)},
+                 {"samplingSeconds", intervalJson(s.samplingSeconds)},
+                 {"imageSeconds", intervalJson(s.imageSeconds)},
+                 {"cpuSeconds", intervalJson(s.cpuSeconds)},
                  {"peakBytes", s.peakBytes},
                  {"stages", mapJson(s.stages)},
                  {"values", mapJson(s.values)},
@@ -135,11 +73,11 @@ Json settingJson(const Sweep& sweep, const SweepSetting& s) {
                  {"samplingCommand", s.samplingCommand},
                  {"failures", s.failures},
                  {"runs", s.records.size()}};
-    json["agreement"] = s.agreement ? toJson(*s.agreement) : Json(nullptr);
+    json["agreement"] = s.agreement ? intervalJson(*s.agreement) : Json(nullptr);
     json["reliability"] = Json::array();
     for (const std::size_t i : s.records) {
         const SweepRecord& record = sweep.records[i];
-        if (record.reliability) json["reliability"].push_back(vlx::toJson(*record.reliability));
+        if (record.reliability) json["reliability"].push_back(toJson(*record.reliability));
         if (!record.file.empty() && record.seed == 1)
             json["image"] = imageJson(sweep.options.folder + "/" + record.file);
     }
@@ -215,39 +153,12 @@ Json pageData(const Sweep& sweep, const SweepSummary& summary, const SweepPageOp
     return data;
 }
 
-void replace(std::string& text, std::string_view place, std::string_view content) {
-    for (std::size_t at = text.find(place); at != std::string::npos;
-         at = text.find(place, at + content.size()))
-        text.replace(at, place.size(), content);
-}
-
-std::string escaped(const std::string& text) {
-    std::string result;
-    for (const char c : text) {
-        if (c == '&')
-            result += "&amp;";
-        else if (c == '<')
-            result += "&lt;";
-        else
-            result += c;
-    }
-    return result;
-}
-
 }  // namespace
 
 std::string toHtml(const Sweep& sweep, const SweepSummary& summary, const SweepPageOptions& options) {
-    std::string data = pageData(sweep, summary, options).dump(-1, ' ', false, Json::error_handler_t::replace);
-    // Inside <script>, "</script>" or "<!--" of a name would end or change it.
-    for (std::size_t at = data.find('<'); at != std::string::npos; at = data.find('<', at))
-        data.replace(at, 1, "\\u003c");
-    std::string html(kPageHtml);
     const std::size_t slash = sweep.options.input.find_last_of('/');
-    replace(html, "@TITLE@", escaped(sweep.options.input.substr(slash == std::string::npos ? 0 : slash + 1)));
-    replace(html, "@CSS@", kPageCss);
-    replace(html, "@SCRIPT@", kPageScript);
-    replace(html, "@DATA@", data);
-    return html;
+    return pageOf(kSweepPage, sweep.options.input.substr(slash == std::string::npos ? 0 : slash + 1),
+                  pageData(sweep, summary, options));
 }
 
 }  // namespace vlx

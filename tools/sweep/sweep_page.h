@@ -13,14 +13,9 @@ struct SweepPageOptions {
     std::vector<SweepTarget> targets;
 };
 
-/// Longest side of images in the page; larger ones are reduced by a whole factor (box average), which the
-/// page says.
-inline constexpr int kPageImageSide = 512;
-
 /// The report: one HTML file without any reference to another, readable offline. Images of the first
-/// repetition and the reference are in it as half floats (deflated, base64), so that exposure and error views
-/// are computed where they are seen. Sources: tools/sweep/report. Throws Error when a kept image or a
-/// region's JSON cannot be read, or a crop lies outside the images.
+/// repetition and the reference are in it as pageImage() makes them. Sources: tools/sweep/report. Throws
+/// Error when a kept image or a region's JSON cannot be read, or a crop lies outside the images.
 std::string toHtml(const Sweep& sweep, const SweepSummary& summary, const SweepPageOptions& options = {});
 
 }  // namespace vlx

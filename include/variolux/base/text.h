@@ -21,6 +21,9 @@ std::string printable(std::string text, std::string_view kept = {});
 /// One number by a format of printf; at most 63 characters.
 std::string formatted(const char* format, double value);
 
+/// Rows of cells; the first cell of a row is flush left, the others flush right.
+std::string aligned(const std::vector<std::vector<std::string>>& rows);
+
 /// 16 hexadecimal digits.
 std::string hexText(std::uint64_t value);
 

@@ -27,6 +27,13 @@ Interval meanInterval(std::span<const double> values);
 /// for what varies by factors (errors, times). If a value is not positive, meanInterval().
 Interval geometricInterval(std::span<const double> values);
 
+/// The ratio of two sums over blocks, such as tiles of a picture: the mean of values of which block i has
+/// `counts[i]`, with sum `sums[i]`. The interval is of its logarithm, as geometricInterval()'s, from the
+/// scatter of the blocks about the ratio (the delta method), with Student's t: it holds for independent
+/// blocks, whatever goes on inside them. Blocks without values do not count. A ratio that is not positive has
+/// no interval.
+Interval ratioInterval(std::span<const double> sums, std::span<const double> counts);
+
 /// A straight line y = intercept + slope x by least squares.
 struct LineFit {
     Interval slope;        ///< interval from the scatter about the line: t of n - 2 degrees of freedom

@@ -40,8 +40,8 @@ function logTicks(low, high, room = 1) {
   return ticks;
 }
 
-function linearTicks(low, high, count = 6) {
-  const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
+function linearTicks(low, high, count = 6, least = 0) {
+  const raw = Math.max((high - low) / count, least), power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((s) => s * power).find((s) => s >= raw);
   const ticks = [];
   for (let v = Math.ceil(low / step) * step; v <= high + step * 1e-9; v += step) ticks.push(Math.abs(v) < step * 1e-9 ? 0 : v);
@@ -61,7 +61,7 @@ function axes(options) {
   };
   const x = scale(options.x, left, width - right), y = scale(options.y, height - bottom, top);
   const svg = draw('svg', { viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': options.label });
-  for (const v of options.x.log ? logTicks(options.x.low, options.x.high, (width - left - right) / 480) : linearTicks(options.x.low, options.x.high)) {
+  for (const v of options.x.log ? logTicks(options.x.low, options.x.high, (width - left - right) / 480) : linearTicks(options.x.low, options.x.high, 6, options.x.step)) {
     svg.append(draw('line', { x1: x(v), x2: x(v), y1: top, y2: height - bottom, class: 'grid' }));
     const text = draw('text', { x: x(v), y: height - bottom + 17, 'text-anchor': 'middle', class: 'soft' });
     text.textContent = digits(v);
@@ -90,8 +90,13 @@ function logLimits(values) {
   return { low: low * Math.exp(-margin), high: high * Math.exp(margin), log: true };
 }
 
+/** Limits of an axis of whole numbers. */
+function wholeLimits(values) {
+  return { low: Math.min(...values) - .5, high: Math.max(...values) + .5, step: 1 };
+}
+
 /**
- * Log-log curves. curves: [{index, name, points: [{x, y, xRange, yRange, text, ring}]}]. Every point can be focused and
+ * Log-log curves, or with whole numbers along x (titles.whole). curves: [{index, name, points: [{x, y, xRange, yRange, text, ring}]}]. Every point can be focused and
  * says what it is.
  */
 function curveChart(target, curves, titles) {
@@ -102,7 +107,7 @@ function curveChart(target, curves, titles) {
   }
   const bounded = (range, value) => range && range[0] > value / 30 && range[1] < value * 30 ? range : [];
   const { svg, x, y } = axes({
-    x: { ...logLimits(points.map((p) => p.x)), title: titles.x },
+    x: { ...(titles.whole ? wholeLimits : logLimits)(points.map((p) => p.x)), title: titles.x },
     y: { ...logLimits(points.flatMap((p) => [p.y, ...bounded(p.yRange, p.y)])), title: titles.y },
     label: `${titles.y} against ${titles.x}`,
   });
