@@ -21,8 +21,11 @@ struct ApartPlanes {
 
 constexpr float kNowhere = -1;
 constexpr float kWildVariances =
-    9;                             // three standard deviations: beyond it is an outlier, how far says nothing
-constexpr int kComparedRows = 80;  // those filled at a time, and patches around
+    9;                          // three standard deviations: beyond it is an outlier, how far says nothing
+constexpr int kWideReach = 10;  // a change too small to be seen in a patch is in more pixels
+// Kriging leaves a twentieth of a datum's variance, or less: what a merged one is off by must be as small.
+constexpr float kSharpness = 20;
+constexpr int kComparedRows = 112;  // those filled at a time, and windows around
 
 /// A feature in units of another scale: saturated() of what it was.
 float rescaled(float value, float ratio) {
@@ -61,10 +64,10 @@ Merge::Merge(const SampledFrame& own, std::vector<Neighbour> before, std::vector
     counts_.luminance = counts_.light = counts_.noise = counts_.removed = 0;
 }
 
-void Merge::startAbove(int first) { comparedRows_ = std::max(0, first - kPatchRadius); }
+void Merge::startAbove(int first) { comparedRows_ = std::max(0, first - kWideReach); }
 
 void Merge::fill(int first, int end, PixelRows& out) {
-    const int compared = std::min(height_, end + kPatchRadius);
+    const int compared = std::min(height_, end + kWideReach);
     apart_.claim(comparedRows_, compared);
     parallelFor(comparedRows_, compared, [&](std::int64_t y) { compareRow(static_cast<int>(y)); });
     comparedRows_ = compared;
@@ -196,30 +199,32 @@ std::vector<float> Merge::weightsOf(int y) const {
     for (std::size_t k = 0; k < neighbours(); ++k)
         for (int half = 0; half < 2; ++half) {
             const int first = ApartPlanes::kChannels * static_cast<int>(k);
-            sums.assign(w, 0.f);
-            counts.assign(w, 0.f);
-            for (int row = std::max(0, y - kPatchRadius); row <= std::min(height_ - 1, y + kPatchRadius);
-                 ++row) {
-                const float* const d = apart_.row(first + ApartPlanes::difference(half), row);
-                const float* const n = apart_.row(first + ApartPlanes::known(half), row);
-                for (std::size_t x = 0; x < w; ++x) {
-                    sums[x] += d[x];
-                    counts[x] += n[x];
-                }
-            }
             const float* const column = apart_.row(first + ApartPlanes::kColumn, y);
             const float* const unlike = apart_.row(first + ApartPlanes::kUnlike, y);
             float* const out = weights.data() + (2 * k + static_cast<std::size_t>(1 - half)) * w;
-            for (int x = 0; x < width_; ++x) {
-                float sum = 0, count = 0;
-                for (int i = std::max(0, x - kPatchRadius); i <= std::min(width_ - 1, x + kPatchRadius);
-                     ++i) {
-                    sum += sums[static_cast<std::size_t>(i)];
-                    count += counts[static_cast<std::size_t>(i)];
+            for (const int reach : {kPatchRadius, kWideReach}) {
+                sums.assign(w, 0.f);
+                counts.assign(w, 0.f);
+                for (int row = std::max(0, y - reach); row <= std::min(height_ - 1, y + reach); ++row) {
+                    const float* const d = apart_.row(first + ApartPlanes::difference(half), row);
+                    const float* const n = apart_.row(first + ApartPlanes::known(half), row);
+                    for (std::size_t x = 0; x < w; ++x) {
+                        sums[x] += d[x];
+                        counts[x] += n[x];
+                    }
                 }
-                const float d = count > 0 ? std::max(0.f, sum / count) : 0;
-                out[x] = column[x] == kNowhere ? 0 : std::exp(-d - unlike[x]);
+                for (int x = 0; x < width_; ++x) {
+                    float sum = 0, count = 0;
+                    for (int i = std::max(0, x - reach); i <= std::min(width_ - 1, x + reach); ++i) {
+                        sum += sums[static_cast<std::size_t>(i)];
+                        count += counts[static_cast<std::size_t>(i)];
+                    }
+                    // What chance explains of it is not held against it.
+                    if (count > 0) out[x] += std::max(0.f, sum / count - std::sqrt(2 / count));
+                }
             }
+            for (int x = 0; x < width_; ++x)
+                out[x] = column[x] == kNowhere ? 0 : std::exp(-kSharpness * out[x] - unlike[x]);
         }
     return weights;
 }

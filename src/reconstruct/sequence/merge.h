@@ -26,10 +26,11 @@ class Merge : public PixelSource {
     /// w_k and numbers of samples; its count is the effective one,
     ///     z = sum w n z / sum w n,    n = (sum w n)^2 / sum w^2 n,    w = 1 for its own.
     /// A neighbour's is interpolated between the four pixels around the point's place there (weights of
-    /// smoothstep: a linear one blurs more, the nearest pixel is off by more). w_k = exp(-d - f - m):
-    ///  - d of the *other* half, so that weights are independent of what they weigh: the mean over 7 x 7
-    ///    pixels of (|dz|^2 - (v1 + v2)) / (v1 + v2), v error variances, each at most kWildVariances: a
-    ///    change of light is in many pixels, a firefly in one;
+    /// smoothstep: a linear one blurs more, the nearest pixel is off by more). w_k = exp(-20 d - f - m):
+    ///  - d of the *other* half, so that weights are independent of what they weigh: of the mean over 7 x 7
+    ///    pixels of (|dz|^2 - (v1 + v2)) / (v1 + v2), v error variances, each at most kWildVariances (a
+    ///    change of light is in many pixels, a firefly in one), what is beyond its standard error sqrt(2 /
+    ///    number); and the same of 21 x 21 pixels, which show smaller changes;
     ///  - f of the features, sum of (df^2 - (u1 + u2)) / (0.2^2 + 2 (u1 + u2)), u their error variances;
     ///  - m = |motion there and back|^2, in pixels: what was hidden goes elsewhere.
     /// Neither is less than 0. Scatter and features are merged by the same weights, those of both halves
