@@ -64,7 +64,8 @@ class Room:
     def animate(self, name, path, values, step=False):
         """values: one for each frame."""
         animation = self.json["animations"][0]
-        times = self._accessor([(frame / FPS,) for frame in range(len(values))], "SCALAR")
+        early = 1e-3 if step else 0  # a key that rounds to later than its frame would be missed
+        times = self._accessor([(max(0, frame / FPS - early),) for frame in range(len(values))], "SCALAR")
         output = self._accessor(values, "VEC4" if path == "rotation" else "VEC3")
         animation["samplers"].append({"input": times, "output": output, "interpolation": "STEP" if step else "LINEAR"})
         animation["channels"].append({"sampler": len(animation["samplers"]) - 1,
