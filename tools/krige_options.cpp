@@ -187,7 +187,8 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
     app.add_option(
            "--max-memory", o.maxMemory,
            "krige: memory of the process at most, for example 2G or 500M (10^9, 10^6 bytes): fewer rows "
-           "are read at a time, and less than a picture of that width needs (170M or more) is refused. The "
+           "are read at a time, and less than a picture of that width needs is refused, with what would do. "
+           "The "
            "result does not depend on it (not with --filter, --sampling-map or --diagnostics)")
         ->option_text("SIZE");
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")

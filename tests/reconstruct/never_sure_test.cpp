@@ -171,6 +171,9 @@ TEST(NeverSure, ABlackPictureMayHaveMissedLight) {
         EXPECT_EQ(image.at(10, 10)[0], 0);
         EXPECT_GT(least(image, "stddev.R"), 0);
     }
+    const ReconstructionReport report = reconstruct(dump, Drift{}).report;
+    EXPECT_EQ(report.drift().light, 0);
+    EXPECT_NE(toText(report).find("no sample has light"), std::string::npos);
 }
 
 // What scatters by a thousandth of the picture's level and what does not scatter at all have missed the same.
