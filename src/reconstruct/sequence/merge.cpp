@@ -25,6 +25,8 @@ constexpr float kWildVariances =
 constexpr int kWideReach = 10;  // a change too small to be seen in a patch is in more pixels
 // Kriging leaves a twentieth of a datum's variance, or less: what a merged one is off by must be as small.
 constexpr float kSharpness = 20;
+// Wider than within a frame: the features are merged too, and the drift explains what they differ by.
+constexpr float kWidth2 = 0.35f * 0.35f;
 constexpr int kComparedRows = 112;  // those filled at a time, and windows around
 
 /// A feature in units of another scale: saturated() of what it was.
@@ -186,7 +188,7 @@ void Merge::compareRow(int y, std::size_t k, const std::vector<float>& places) {
             const float ratio = scale[i] / layout_.scale[i];
             const float d = fa[plane(f)] - rescaled(fb[plane(f)], ratio);
             const float u = fa[plane(features_.error(f))] + ratio * ratio * fb[plane(features_.error(f))];
-            distance += (d * d - u) / (kFeatureWidth2 + 2 * u);
+            distance += (d * d - u) / (kWidth2 + 2 * u);
         }
         out(ApartPlanes::kUnlike)[x] += std::max(0.f, distance);
     }

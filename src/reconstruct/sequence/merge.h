@@ -31,7 +31,7 @@ class Merge : public PixelSource {
     ///    pixels of (|dz|^2 - (v1 + v2)) / (v1 + v2), v error variances, each at most kWildVariances (a
     ///    change of light is in many pixels, a firefly in one), what is beyond its standard error sqrt(2 /
     ///    number); and the same of 21 x 21 pixels, which show smaller changes;
-    ///  - f of the features, sum of (df^2 - (u1 + u2)) / (0.2^2 + 2 (u1 + u2)), u their error variances;
+    ///  - f of the features, sum of (df^2 - (u1 + u2)) / (0.35^2 + 2 (u1 + u2)), u their error variances;
     ///  - m = |motion there and back|^2, in pixels: what was hidden goes elsewhere.
     /// Neither is less than 0. Scatter and features are merged by the same weights, those of both halves
     /// averaged.
