@@ -17,7 +17,6 @@ namespace vlx {
 namespace {
 
 constexpr int kColumns = 72, kLines = 56, kSamples = 4;
-constexpr double kNoise = 0.4;  // standard deviation of a sample, of the signal
 
 /// What a shot truly shows, and what moves in it.
 struct MadeUpShot {
@@ -28,6 +27,8 @@ struct MadeUpShot {
     /// Pixels along x since the frame before; none: no channels of motion.
     std::function<double(int frame, int x, int y)> motion = {};
     int first = 1, last = 7, columns = kColumns;
+    double noise = 0.4;       ///< standard deviation of a sample, of the signal
+    double featureNoise = 0;  ///< of the albedo of a sample
     unsigned seed = 1;
     bool sameNoise = false;  ///< and seed
 
@@ -48,11 +49,12 @@ struct MadeUpShot {
         for (int y = 0; y < kLines; ++y)
             for (int x = 0; x < columns; ++x) {
                 for (int s = 0; s < kSamples; ++s) {
-                    const double z = truth(frame, x, y) * (1 + kNoise * normal(random));
+                    const double z = truth(frame, x, y) * (1 + noise * normal(random));
                     for (std::size_t c = 0; c < 3; ++c)
                         band.values[c].push_back(static_cast<float>(z * (1 - 0.3 * static_cast<double>(c))));
+                    const double blurred = featureNoise > 0 ? featureNoise * normal(random) : 0;
                     for (std::size_t c = 3; c < 6; ++c)
-                        band.values[c].push_back(static_cast<float>(albedo(frame, x, y)));
+                        band.values[c].push_back(static_cast<float>(albedo(frame, x, y) + blurred));
                     if (!motion) continue;
                     const double step = motion(frame, x, y);
                     const double values[] = {-step, 0, step, 0};
@@ -136,6 +138,19 @@ TEST(Sequence, MotionBringsDataTogether) {
     EXPECT_LT(shot.ratio(4), 1.02) << "as they lie they are others";
     shot.motion = [](int, int, int) { return 3.0; };
     EXPECT_LT(shot.ratio(4), 0.6);
+}
+
+// Samples are too few to show it, and their albedo is blurred by the motion: it differs everywhere all the
+// same.
+TEST(Sequence, APanWithoutMotionVectorsCostsLittle) {
+    MadeUpShot shot;
+    shot.albedo = [](int frame, int x, int y) { return (x + 11 * frame) / 9 % 2 == y / 9 % 2 ? 0.7 : 0.4; };
+    shot.truth = shot.albedo;
+    shot.noise = 1.2;
+    shot.featureNoise = 0.2;
+    EXPECT_LT(shot.ratio(4), 1.05);
+    shot.motion = [](int, int, int) { return -11.0; };
+    EXPECT_LT(shot.ratio(4), 0.7);
 }
 
 TEST(Sequence, ACutOrAFlashCostsNothing) {
@@ -232,8 +247,7 @@ TEST(Sequence, FramesOfAnotherSizeAreRefused) {
         sequence.reconstruct(4);
         FAIL();
     } catch (const Error& error) {
-        EXPECT_NE(std::string(error.what()).find("frame 5: expected "), std::string::npos)
-            << error.what();
+        EXPECT_NE(std::string(error.what()).find("frame 5: expected "), std::string::npos) << error.what();
     }
 }
 

@@ -1,6 +1,7 @@
 #include "reconstruct/sequence/merge.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "reconstruct/drift/centre.h"
@@ -15,11 +16,13 @@ struct ApartPlanes {
     static constexpr int kColumn = 0, kRow = 1;                     // kNowhere: not in the picture
     static constexpr int difference(int half) { return 2 + half; }  // of the halves' means, in units of noise
     static constexpr int known(int half) { return 4 + half; }       // 1 where there is one
-    static constexpr int kUnlike = 6;                               // by features and motion
-    static constexpr int kChannels = 7;
+    static constexpr int kBeyond = 6, kBeyondKnown = 7;             // likewise of features
+    static constexpr int kUnlike = 8;                               // by features and motion
+    static constexpr int kChannels = 9;
 };
 
 constexpr float kNowhere = -1;
+constexpr float kFar = 1e30f;
 constexpr float kWildVariances =
     9;                          // three standard deviations: beyond it is an outlier, how far says nothing
 constexpr int kWideReach = 10;  // a change too small to be seen in a patch is in more pixels
@@ -27,6 +30,8 @@ constexpr int kWideReach = 10;  // a change too small to be seen in a patch is i
 constexpr float kSharpness = 20;
 // Wider than within a frame: the features are merged too, and the drift explains what they differ by.
 constexpr float kWidth2 = 0.35f * 0.35f;
+// Of what lies beyond the four pixels in many pixels, which no interpolation explains.
+constexpr float kBeyondWidth2 = 0.03f * 0.03f;
 constexpr int kComparedRows = 112;  // those filled at a time, and windows around
 
 /// A feature in units of another scale: saturated() of what it was.
@@ -40,6 +45,23 @@ float rescaled(float value, float ratio) {
 bool isInside(float place, int size) { return place > -0.5f && place < static_cast<float>(size) - 0.5f; }
 
 float smoothstep(float t) { return t * t * (3 - 2 * t); }
+
+/// One of the four pixels around a place, and its weight.
+struct Corner {
+    int column, row;
+    float part;
+};
+std::array<Corner, 4> cornersOf(float column, float row, int width, int height) {
+    const float left = std::floor(column), top = std::floor(row);
+    const float beyond[2] = {smoothstep(column - left), smoothstep(row - top)};
+    std::array<Corner, 4> corners;
+    for (int j = 0; j < 4; ++j)
+        corners[static_cast<std::size_t>(j)] = {
+            std::clamp(static_cast<int>(left) + j % 2, 0, width - 1),
+            std::clamp(static_cast<int>(top) + j / 2, 0, height - 1),
+            (j % 2 == 0 ? 1 - beyond[0] : beyond[0]) * (j / 2 == 0 ? 1 - beyond[1] : beyond[1])};
+    return corners;
+}
 
 }  // namespace
 
@@ -151,6 +173,8 @@ void Merge::compareRow(int y, std::size_t k, const std::vector<float>& places) {
         std::fill_n(out(ApartPlanes::difference(half)), width_, 0.f);
         std::fill_n(out(ApartPlanes::known(half)), width_, 0.f);
     }
+    std::fill_n(out(ApartPlanes::kBeyond), width_, 0.f);
+    std::fill_n(out(ApartPlanes::kBeyondKnown), width_, 0.f);
     const auto w = static_cast<std::size_t>(width_);
     const auto at = [&](const RowRing& ring, int row, int col) { return ring.row(0, row) + col; };
     const auto plane = [&](int p) { return static_cast<std::size_t>(p) * w; };
@@ -182,52 +206,77 @@ void Merge::compareRow(int y, std::size_t k, const std::vector<float>& places) {
             out(ApartPlanes::known(half))[x] = 1;
         }
         const float *const fa = at(own.features(), y, x), *const fb = at(other.features(), row, col);
-        float distance = 0;
+        const std::array<Corner, 4> corners = cornersOf(place[0], place[1], width_, height_);
+        float distance = 0, squares = 0, noise = 0, sum = kLeastSquare;
         for (int f = 0; f < layout_.features; ++f) {
             const auto i = static_cast<std::size_t>(f);
             const float ratio = scale[i] / layout_.scale[i];
-            const float d = fa[plane(f)] - rescaled(fb[plane(f)], ratio);
-            const float u = fa[plane(features_.error(f))] + ratio * ratio * fb[plane(features_.error(f))];
+            const float mine = fa[plane(f)], error = fa[plane(features_.error(f))];
+            const float d = mine - rescaled(fb[plane(f)], ratio);
+            const float u = error + ratio * ratio * fb[plane(features_.error(f))];
             distance += (d * d - u) / (kWidth2 + 2 * u);
+            float least = kFar, most = -kFar, spread = error;
+            for (const auto& [c, r, part] : corners) {
+                const float* const of = at(other.features(), r, c);
+                const float value = rescaled(of[plane(f)], ratio);
+                least = std::min(least, value);
+                most = std::max(most, value);
+                spread += part * part * ratio * ratio * of[plane(features_.error(f))];
+            }
+            const float beyond = mine - std::clamp(mine, least, most);
+            squares += beyond * beyond;
+            noise += spread;
+            sum += kBeyondWidth2 + spread;
         }
+        out(ApartPlanes::kBeyond)[x] = std::min(kWildVariances, (squares - noise) / sum);
+        out(ApartPlanes::kBeyondKnown)[x] = a[plane(planes_.count())] > 0 && b[plane(planes_.count())] > 0;
         out(ApartPlanes::kUnlike)[x] += std::max(0.f, distance);
+    }
+}
+
+/// out += what chance does not explain of the mean of a plane of neighbour k within `reach` of row y.
+void Merge::addExcess(int y, std::size_t k, int plane, int known, int reach, float* out) const {
+    const auto w = static_cast<std::size_t>(width_);
+    const int first = ApartPlanes::kChannels * static_cast<int>(k);
+    std::vector<float> sums(w), counts(w);
+    for (int row = std::max(0, y - reach); row <= std::min(height_ - 1, y + reach); ++row) {
+        const float* const d = apart_.row(first + plane, row);
+        const float* const n = apart_.row(first + known, row);
+        for (std::size_t x = 0; x < w; ++x) {
+            sums[x] += d[x];
+            counts[x] += n[x];
+        }
+    }
+    for (int x = 0; x < width_; ++x) {
+        float sum = 0, count = 0;
+        for (int i = std::max(0, x - reach); i <= std::min(width_ - 1, x + reach); ++i) {
+            sum += sums[static_cast<std::size_t>(i)];
+            count += counts[static_cast<std::size_t>(i)];
+        }
+        if (count > 0) out[x] += std::max(0.f, sum / count - std::sqrt(2 / count));
     }
 }
 
 /// Of each neighbour and half, row by row of pixels.
 std::vector<float> Merge::weightsOf(int y) const {
     const auto w = static_cast<std::size_t>(width_);
-    std::vector<float> weights(2 * neighbours() * w), sums(w), counts(w);
-    for (std::size_t k = 0; k < neighbours(); ++k)
+    std::vector<float> weights(2 * neighbours() * w), beyond(w);
+    for (std::size_t k = 0; k < neighbours(); ++k) {
+        const int first = ApartPlanes::kChannels * static_cast<int>(k);
+        const float* const column = apart_.row(first + ApartPlanes::kColumn, y);
+        const float* const unlike = apart_.row(first + ApartPlanes::kUnlike, y);
+        beyond.assign(w, 0.f);
+        for (const int reach : {kPatchRadius, kWideReach})
+            addExcess(y, k, ApartPlanes::kBeyond, ApartPlanes::kBeyondKnown, reach, beyond.data());
         for (int half = 0; half < 2; ++half) {
-            const int first = ApartPlanes::kChannels * static_cast<int>(k);
-            const float* const column = apart_.row(first + ApartPlanes::kColumn, y);
-            const float* const unlike = apart_.row(first + ApartPlanes::kUnlike, y);
             float* const out = weights.data() + (2 * k + static_cast<std::size_t>(1 - half)) * w;
-            for (const int reach : {kPatchRadius, kWideReach}) {
-                sums.assign(w, 0.f);
-                counts.assign(w, 0.f);
-                for (int row = std::max(0, y - reach); row <= std::min(height_ - 1, y + reach); ++row) {
-                    const float* const d = apart_.row(first + ApartPlanes::difference(half), row);
-                    const float* const n = apart_.row(first + ApartPlanes::known(half), row);
-                    for (std::size_t x = 0; x < w; ++x) {
-                        sums[x] += d[x];
-                        counts[x] += n[x];
-                    }
-                }
-                for (int x = 0; x < width_; ++x) {
-                    float sum = 0, count = 0;
-                    for (int i = std::max(0, x - reach); i <= std::min(width_ - 1, x + reach); ++i) {
-                        sum += sums[static_cast<std::size_t>(i)];
-                        count += counts[static_cast<std::size_t>(i)];
-                    }
-                    // What chance explains of it is not held against it.
-                    if (count > 0) out[x] += std::max(0.f, sum / count - std::sqrt(2 / count));
-                }
-            }
+            std::copy(beyond.begin(), beyond.end(), out);
+            for (const int reach : {kPatchRadius, kWideReach})
+                addExcess(y, k, ApartPlanes::difference(half), ApartPlanes::known(half), reach, out);
             for (int x = 0; x < width_; ++x)
                 out[x] = column[x] == kNowhere ? 0 : std::exp(-kSharpness * out[x] - unlike[x]);
         }
+    }
     return weights;
 }
 
@@ -242,15 +291,8 @@ void Merge::addTaps(int x, int y, std::size_t k, const std::vector<float>& weigh
     if (column == kNowhere || (weight[0] <= 0 && weight[1] <= 0)) return;
     const Frame& frame = neighbour(k).frame->frame();
     const PixelRows& of = frame.fine().pixels();
-    const float left = std::floor(column), top = std::floor(row);
-    const float beyond[2] = {smoothstep(column - left), smoothstep(row - top)};
-    for (int j = 0; j < 4; ++j) {
-        const float part =
-            (j % 2 == 0 ? 1 - beyond[0] : beyond[0]) * (j / 2 == 0 ? 1 - beyond[1] : beyond[1]);
-        if (part <= 0) continue;
-        const int c = std::clamp(static_cast<int>(left) + j % 2, 0, width_ - 1),
-                  r = std::clamp(static_cast<int>(top) + j / 2, 0, height_ - 1);
-        if (of.data.row(planes_.count(), r)[c] <= 0) continue;
+    for (const auto& [c, r, part] : cornersOf(column, row, width_, height_)) {
+        if (part <= 0 || of.data.row(planes_.count(), r)[c] <= 0) continue;
         taps.push_back({of.data.row(0, r) + c,
                         of.squares.row(0, r) + c,
                         layout_.features > 0 ? of.raw.row(0, r) + c : nullptr,

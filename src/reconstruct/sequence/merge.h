@@ -51,6 +51,7 @@ class Merge : public PixelSource {
     std::size_t neighbours() const { return before_.size() + after_.size(); }
     void compareRow(int y);
     void compareRow(int y, std::size_t k, const std::vector<float>& places);
+    void addExcess(int y, std::size_t k, int plane, int known, int reach, float* out) const;
     std::vector<float> weightsOf(int y) const;
     void mergeRow(int y, PixelRows& out) const;
     void countRow(int y, const PixelRows& out);

@@ -56,8 +56,7 @@ void requireAlike(const LoadedFrame& there, const LoadedFrame& own) {
     const Window &a = there.source->header().data, &b = own.source->header().data;
     const std::string help = ", as " + own.source->path() + " has: --temporal 0 kriges each frame by itself";
     if (a != b)
-        throw Error(there.source->path(),
-                    "expected " + windowText(b) + ", found " + windowText(a) + help);
+        throw Error(there.source->path(), "expected " + windowText(b) + ", found " + windowText(a) + help);
     const SampleLayout &x = there.samples.frame().layout(), &y = own.samples.frame().layout();
     if (x.radiance != y.radiance || x.features != y.features || x.alpha != y.alpha || x.group != y.group)
         throw Error(there.source->path(), "expected " + std::to_string(y.radiance) +
