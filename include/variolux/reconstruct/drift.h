@@ -69,9 +69,9 @@
 ///    lie farther from the range of all others than it is wide count as not known.
 /// 10. *Sequences* (sequence.h): data of the frames before and after join the frame's own before step 2. What
 ///    was at a pixel's point, by its motion from frame to frame, is interpolated between the four pixels
-///    around, and weighted by exp(-20 d - f - m): d the distance of the other half's patches as in step 3, f
-///    that of the features, m the square of what motion there and back differs by, in pixels. A frame's own
-///    data weigh 1. Kriging then sees more samples in a pixel, and the error map counts what they are worth:
+///    around, and weighted by exp(-20 d - f - m): d what the other half's colours and the features around
+///    differ by, f what those of the pixel do, m the square of what motion there and back does, in pixels. A
+///    frame's own data weigh 1. Kriging then sees more samples in a pixel, and the error map counts what they are worth:
 ///    (sum w n)^2 / sum w^2 n.
 ///
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named

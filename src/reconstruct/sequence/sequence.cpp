@@ -42,6 +42,7 @@ struct LoadedFrame {
     std::unique_ptr<SampleSource> source;
     Image outline;
     std::map<std::string, double> seconds;
+    bool timed = false;  ///< its time is in a frame's report
     StageClock clock;
     SampledFrame samples;
 };
@@ -85,9 +86,10 @@ struct Sequence::Impl {
         std::vector<Neighbour> found;
         const LoadedFrame& own = *load(frame);
         for (int k = 1; k <= options.temporal && frame + step * k >= 0; ++k) {
-            const LoadedFrame* const there = load(frame + step * k);
+            LoadedFrame* const there = load(frame + step * k);
             if (!there) break;
             requireAlike(*there, own);
+            there->timed = true;
             found.push_back({&there->samples, sameSeed(*there, own)});
         }
         return found;
@@ -104,11 +106,12 @@ ReconstructionReport Sequence::reconstruct(int frame, const RowSink& sink, const
     std::erase_if(impl_->frames, [&](const auto& entry) {
         return entry.first < frame - reach || entry.first > frame + reach || !entry.second;
     });
-    const LoadedFrame* const own = impl_->load(frame);
+    LoadedFrame* const own = impl_->load(frame);
     if (!own) throw Error("", "expected frame " + std::to_string(frame) + " of the sequence, found none");
     ReconstructionReport report;
     DriftReport& drift = report.method.emplace<DriftReport>();
-    drift.seconds = own->seconds;
+    if (!own->timed) drift.seconds = own->seconds;
+    own->timed = true;
     StageClock clock(drift.seconds);
     const std::vector<Neighbour> before = impl_->beside(frame, -1), after = impl_->beside(frame, 1);
     clock.addTo("other frames");
