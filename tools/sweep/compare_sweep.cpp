@@ -52,7 +52,8 @@ struct SweepCommand {
             app.add_option("--frames", o.frames,
                            "Of a scene: trace and judge these frames, for example 1-8; errors are means over "
                            "them, times sums. #### in the reference's name stands for a frame's number. "
-                           "Adds the methods that need frames, and flicker")
+                           "vlx-krige gets all at once, other programs one by one. Adds the methods that "
+                           "need frames, and flicker")
                 ->option_text("LIST");
         app.add_option("--seeds", o.seeds, "Repetitions with independent samples, for the intervals")
             ->check(CLI::Range(1, 1000))
