@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <vector>
 
+#include "frames.h"
 #include "process/child_process.h"
 #include "sweep/sweep.h"
 #include "sweep/sweep_page.h"
@@ -46,6 +48,13 @@ struct SweepCommand {
                        "maps predict, and of images without a map those that vlx-krige --assess tells "
                        "(for which their command is run twice more)")
             ->option_text("IMAGE");
+        auto* frames =
+            app.add_option("--frames", o.frames,
+                           "Of a scene: trace and judge these frames, for example 1-8; errors are means over "
+                           "them, times sums. #### in the reference's name stands for a frame's number. "
+                           "vlx-krige gets all at once, other programs one by one. Adds the methods that "
+                           "need frames, and flicker")
+                ->option_text("LIST");
         app.add_option("--seeds", o.seeds, "Repetitions with independent samples, for the intervals")
             ->check(CLI::Range(1, 1000))
             ->capture_default_str();
@@ -92,7 +101,8 @@ struct SweepCommand {
 
         const char* const how = "Methods";
         std::string names;
-        for (const SweepMethod& method : builtInMethods()) names += (names.empty() ? "" : ",") + method.name;
+        for (const SweepMethod& method : builtInMethods())
+            names += (names.empty() ? "" : ",") + method.name + (method.ofSequences ? " with --frames" : "");
         app.add_option("--methods", methods,
                        "Built-in methods (default: " + names +
                            "); none: only those of --external, or only sampling if there are none")
@@ -128,6 +138,7 @@ struct SweepCommand {
                        "Regions whose variogram the report shows; a quarter as many of the largest errors "
                        "are added")
             ->check(CLI::Range(0, 1000))
+            ->excludes(frames)
             ->capture_default_str()
             ->group(how);
 
@@ -158,19 +169,24 @@ struct SweepCommand {
                    "Examples:\n"
                    "  vlx-compare sweep room.glb --reference room_reference.exr -o sweep \\\n"
                    "      --hierarchical 0.1,0.05 --target relmse=0.01\n"
+                   "  vlx-compare sweep shot.glb --frames 1-8 --reference reference_####.exr -o sweep\n"
                    "  vlx-compare sweep dump.exr -o sweep --reference reference.exr \\\n"
                    "      --external other='denoise {input} {output}'");
     }
 
     void chooseMethods() {
         const std::vector<SweepMethod>& known = builtInMethods();
-        if (methods.empty()) options.methods = known;
+        if (methods.empty())
+            std::copy_if(known.begin(), known.end(), std::back_inserter(options.methods),
+                         [&](const SweepMethod& m) { return !m.ofSequences || !options.frames.empty(); });
         if (methods == std::vector<std::string>{"none"}) methods.clear();
         for (const std::string& name : methods) {
             const auto found = std::find_if(known.begin(), known.end(),
                                             [&](const SweepMethod& m) { return m.name == name; });
             if (found == known.end())
                 throw CLI::ValidationError("--methods", "no method is called '" + name + "'; see --help");
+            if (found->ofSequences && options.frames.empty())
+                throw CLI::ValidationError("--methods", "'" + name + "' goes with --frames");
             if (std::any_of(options.methods.begin(), options.methods.end(),
                             [&](const SweepMethod& m) { return m.name == name; }))
                 throw CLI::ValidationError("--methods", "'" + name + "' is there twice");
@@ -225,6 +241,12 @@ struct SweepCommand {
                      !options.traceArguments.empty()))
             throw CLI::ValidationError(
                 "--hierarchical, --width, --height and --trace-options go with a scene");
+        if (dump && !options.frames.empty()) throw CLI::ValidationError("--frames goes with a scene");
+        if (!options.frames.empty()) {
+            parseFrames(options.frames);
+            if (!options.reference.empty()) requireFramePlace("--reference", options.reference);
+            options.inspectedRegions = 0;
+        }
         if (!dump && options.traceSeconds > 0) throw CLI::ValidationError("--trace-seconds goes with a dump");
         chooseMethods();
         options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "process/child_process.h"
-#include "sweep/assess_image.h"
+#include "sweep/judge_images.h"
 #include "sweep/machine.h"
 #include "sweep/sweep_command.h"
 #include "sweep/sweep_images.h"
@@ -96,7 +96,7 @@ class Runner {
     void runSampling(const SweepSampling& sampling, int seed) {
         const std::string command = plan_.samplingCommand(sampling, seed);
         const std::string key = plan_.samplingKey(command);
-        const std::string dump = scratch() + "/" + key + ".exr";
+        const std::string dump = scratch() + "/" + plan_.imageName(key);
 
         std::vector<Task> tasks;
         for (const SweepMethod* method : plan_.methodsFor(sampling)) {
@@ -107,7 +107,7 @@ class Runner {
             record.seed = seed;
             record.command = plan_.methodCommand(*method, sampling, seed);
             record.key = plan_.imageKey(key, *method, record.command);
-            if (seed == 1 && method->knob.empty()) record.file = "images/" + record.key + ".exr";
+            if (seed == 1 && method->knob.empty()) record.file = "images/" + plan_.imageName(record.key);
             tasks.push_back({method, record});
         }
 
@@ -116,7 +116,7 @@ class Runner {
             return !done(task.record) || (inspects(task) && !doneInspection(task.record));
         });
         SweepRecord traced = known ? *known : SweepRecord{};
-        const bool reused = known && (!needed || fs::exists(dump));
+        const bool reused = known && (!needed || areThere(dump));
         if (!reused) traced = sample(command, key, dump, sampling, seed);
         if (reused) ++sweep_.reused;
         announce(plan_.fromDump ? "sub-set" : "tracing", sampling, seed, traced, reused);
@@ -131,15 +131,24 @@ class Runner {
             sweep_.records.push_back(record);
             if (inspects(task) && record.failure.empty()) inspect(task, record, dump);
         }
+        if (!plan_.options.keepDumps) remove(dump);
+    }
+
+    // Of patterns: all frames.
+    bool areThere(const std::string& pattern) const {
+        const std::vector<std::string> files = plan_.files(pattern);
+        return std::all_of(files.begin(), files.end(),
+                           [](const std::string& file) { return fs::exists(file); });
+    }
+    void remove(const std::string& pattern) const {
         std::error_code ignored;
-        if (!plan_.options.keepDumps) fs::remove(dump, ignored);
+        for (const std::string& file : plan_.files(pattern)) fs::remove(file, ignored);
     }
 
     const SweepRecord* done(const SweepRecord& record) const {
         const SweepRecord* found = results_->find(record.key);
-        return found && (record.file.empty() || fs::exists(plan_.options.folder + "/" + record.file))
-                   ? found
-                   : nullptr;
+        return found && (record.file.empty() || areThere(plan_.options.folder + "/" + record.file)) ? found
+                                                                                                    : nullptr;
     }
 
     /// What a run took.
@@ -156,14 +165,16 @@ class Runner {
         record.key = key;
         record.sampling = sampling;
         record.seed = seed;
-        record.command = filled(command, {{"output", "samples.exr"}});
+        record.command = filled(command, {{"output", plan_.imageName("samples")}});
         record.load = loadAverage();
         const ProcessRun run = runCommand(plan_.executable(filled(command, {{"output", shellQuoted(dump)}})));
         if (run.exitCode != 0)
             throw Error(
                 "", record.command + " failed (exit code " + std::to_string(run.exitCode) + "):\n" + run.err);
-        if (plan_.reference) plan_.requireReferenceWindow(readImage(dump).data);
-        record.dumpBytes = static_cast<std::int64_t>(fs::file_size(dump));
+        for (const std::string& file : plan_.files(dump)) {
+            if (!plan_.references.empty()) plan_.requireReferenceWindow(readImage(file).data);
+            record.dumpBytes += static_cast<std::int64_t>(fs::file_size(file));
+        }
         if (plan_.fromDump) {
             record.samplesPerPixel = sampling.setting;
             record.seconds = plan_.samplingTimeKnown
@@ -172,11 +183,15 @@ class Runner {
             record.cpuSeconds = kNan;  // the renderer's, not ours to know
             if (plan_.samplingTimeKnown) record.stages["trace"] = record.seconds;
         } else {
-            const Json report = reportOf(run, record.command);
-            const double trace = report.at("traceSeconds"), write = report.at("writeCpuSeconds");
-            const double rays = report.at("traceCpuSeconds");
-            const double pixels = report.at("width").get<double>() * report.at("height").get<double>();
-            record.samplesPerPixel = report.at("samples").get<double>() / pixels;
+            double trace = 0, write = 0, rays = 0, samples = 0, pixels = 0;
+            for (const Json& report : reportsOf(run, record.command)) {
+                trace += report.at("traceSeconds").get<double>();
+                write += report.at("writeCpuSeconds").get<double>();
+                rays += report.at("traceCpuSeconds").get<double>();
+                samples += report.at("samples").get<double>();
+                pixels += report.at("width").get<double>() * report.at("height").get<double>();
+            }
+            record.samplesPerPixel = samples / pixels;
             take(run, record);
             record.values = {{"trace_cpu_seconds", rays}, {"write_cpu_seconds", write}};
             // Writing goes on beside tracing: of the wall time it gets its share of the processor's.
@@ -198,69 +213,71 @@ class Runner {
 
     SweepRecord makeImage(const Task& task, const std::string& dump) {
         SweepRecord record = task.record;
-        const std::string image = scratch() + "/" + record.key + ".image.exr";
+        const std::string image = scratch() + "/" + plan_.imageName(record.key + ".image");
         if (record.command.find("{sigma}") != std::string::npos) {
-            const double sigma =
-                bestSigma(colourOf(readImage(dump), dump), plan_.reference->colour, plan_.options.input);
+            const std::size_t middle = plan_.frames.size() / 2;
+            const double sigma = bestSigma(colourOf(readImage(plan_.files(dump)[middle]), dump),
+                                           plan_.references[middle].colour, plan_.options.input);
             record.values["sigma"] = sigma;
             record.command = filled(record.command, {{"sigma", numberText(sigma)}});
         }
         record.load = loadAverage();
-        std::error_code ignored;
-        fs::remove(image, ignored);
-        const ProcessRun run = runCommand(plan_.executable(
-            filled(record.command, {{"input", shellQuoted(dump)}, {"output", shellQuoted(image)}})));
-        record.command = filled(record.command, {{"input", "samples.exr"}, {"output", "image.exr"}});
+        remove(image);
+        const ProcessRun run = runMethod(record.command, dump, image);
+        record.command = filled(
+            record.command, {{"input", plan_.imageName("samples")}, {"output", plan_.imageName("image")}});
         take(run, record);
         if (run.exitCode != 0)
             record.failure = failureOf(run);
         else
             judge(record, run, image, dump, task);
-        if (record.failure.empty() && !record.file.empty())
-            moveTo(plan_.options.folder + "/" + record.file, image);
-        else
-            fs::remove(image, ignored);
+        if (record.failure.empty() && !record.file.empty()) {
+            const std::vector<std::string> made = plan_.files(image);
+            const std::vector<std::string> kept = plan_.files(plan_.options.folder + "/" + record.file);
+            for (std::size_t i = 0; i < made.size(); ++i) moveTo(kept[i], made[i]);
+        } else {
+            remove(image);
+        }
         results_->add(record);
         return record;
     }
 
-    /// Metrics, predicted error and stages of an image that was made.
-    void judge(SweepRecord& record, const ProcessRun& run, const std::string& path, const std::string& dump,
+    /// Once, or for each frame until one fails.
+    ProcessRun runMethod(const std::string& command, const std::string& dump,
+                         const std::string& image) const {
+        const auto runOn = [&](const std::string& input, const std::string& output) {
+            return runCommand(plan_.executable(
+                filled(command, {{"input", shellQuoted(input)}, {"output", shellQuoted(output)}})));
+        };
+        if (firstWord(command) == "vlx-krige") return runOn(dump, image);
+        const std::vector<std::string> inputs = plan_.files(dump), outputs = plan_.files(image);
+        ProcessRun all;
+        for (std::size_t i = 0; i < inputs.size() && all.exitCode == 0; ++i) {
+            const ProcessRun run = runOn(inputs[i], outputs[i]);
+            all.exitCode = run.exitCode;
+            all.seconds += run.seconds;
+            all.userSeconds += run.userSeconds;
+            all.systemSeconds += run.systemSeconds;
+            all.peakBytes = std::max(all.peakBytes, run.peakBytes);
+            all.out += run.out;
+            all.err = run.err;
+        }
+        return all;
+    }
+
+    void judge(SweepRecord& record, const ProcessRun& run, const std::string& image, const std::string& dump,
                const Task& task) const {
         try {
-            const Image image = readImage(path);
-            const Image colour = colourOf(image, path);
-            std::optional<Image> stddev;
-            if (hasLayer(image, kStddev)) stddev = colourOf(image, path, kStddev);
-            if (plan_.reference) {
-                const Comparison comparison = compareColour(plan_.reference->colour, colour, path);
-                for (const MetricInfo& info : metricInfos())
-                    record.values[std::string(info.name)] = comparison[info.metric];
-                if (plan_.reference->stddev)
-                    record.values["floor"] =
-                        predictedError(plan_.reference->colour, *plan_.reference->stddev, path).relMse;
-                if (stddev) {
-                    record.reliability = reliabilityOf(plan_.reference->colour, colour, *stddev,
-                                                       plan_.reference->stddev, path);
-                    record.values["exact_pixels"] = exactPixels(colour, *stddev, *plan_.reference);
-                }
-            }
-            if (stddev) {
-                const PredictedError predicted = predictedError(colour, *stddev, path);
-                record.values["predicted_rmse"] = predicted.rmse;
-                record.values["predicted_relmse"] = predicted.relMse;
-            } else if (!plan_.reference) {
-                const std::string command = plan_.methodCommand(*task.method, record.sampling, record.seed);
-                record.values.merge(assessedErrors(plan_, command, dump, path, scratch() + "/" + record.key));
-                if (record.values.at("assessed_by_halves") == 0)
-                    say(record.method + ", " + samplingText(record.sampling) +
-                        ": its images of half the samples failed or do not fit; its error is less well "
-                        "known");
-            }
+            judgeImages(plan_, plan_.methodCommand(*task.method, record.sampling, record.seed), dump, image,
+                        scratch() + "/" + record.key, record);
         } catch (const Error& error) {
             record.failure = error.what();
             return;
         }
+        if (const auto halves = record.values.find("assessed_by_halves");
+            halves != record.values.end() && halves->second < 1)
+            say(record.method + ", " + samplingText(record.sampling) +
+                ": its images of half the samples failed or do not fit; its error is less well known");
         record.stages = stagesOf(run);
     }
 
@@ -301,10 +318,11 @@ class Runner {
             const Image colour = colourOf(made, path);
             std::optional<Image> stddev;
             if (hasLayer(made, kStddev)) stddev = colourOf(made, path, kStddev);
+            const ReferenceImage* reference = plan_.references.empty() ? nullptr : &plan_.references.front();
             std::string command =
                 plan_.methodCommand(*task.method, image.sampling, image.seed) + " --diagnostics";
             for (const auto& [x, y] :
-                 inspectedPixels(errorImage(colour, stddev, plan_.reference), plan_.options.inspectedRegions))
+                 inspectedPixels(errorImage(colour, stddev, reference), plan_.options.inspectedRegions))
                 command += " --inspect " + std::to_string(x) + "," + std::to_string(y);
             const std::string output = scratch() + "/" + record.key + ".exr";
             const ProcessRun run = runCommand(plan_.executable(

@@ -20,9 +20,10 @@ namespace vlx {
 ///   {spp}      samples a pixel, {seed} the number of the repetition from 1, {threads} 0 or the limit
 ///   {sigma}    of the sigmas from 0.2 to 4 pixels that of the Gaussian filter which brings the plain average
 ///              of this dump nearest to the reference (least relMSE): only with a reference
-/// A first word vlx-krige, vlx-trace or vlx-pack means this build's program. If the command prints a JSON
-/// object on standard output, its "seconds" (an object: stage -> seconds), or else its readSeconds and
-/// solveSeconds, are the stages of its time.
+/// A first word vlx-krige, vlx-trace or vlx-pack means this build's program. Of frames (SweepOptions::frames)
+/// vlx-krige is run once, with --frames and files named by patterns, other programs once for each. If the
+/// command prints a JSON object on standard output, its "seconds" (an object: stage -> seconds), or else its
+/// readSeconds and solveSeconds, are the stages of its time.
 struct SweepMethod {
     std::string name = {};
     std::string command = {};
@@ -32,6 +33,7 @@ struct SweepMethod {
     /// Options to make it write DUMP-side diagnostics of chosen regions (see diagnosticsJson.h); empty:
     /// cannot.
     bool inspectable = false;
+    bool ofSequences = false;  ///< frames add to each other: only with SweepOptions::frames
     /// Not empty: a variation of a method's option, run at one sampling only, for example "paper --region".
     std::string knob = {};
 };
@@ -52,7 +54,8 @@ SweepMethod parseExternal(const std::string& text);
 
 struct SweepOptions {
     std::string input;                 ///< a scene (.glb, .gltf) or a dump (.exr)
-    std::string reference;             ///< may be empty
+    std::string frames;                ///< of a scene, as vlx-trace --frames takes them; empty: one picture
+    std::string reference;             ///< with frames a pattern, with #### for their numbers; may be empty
     std::string folder;                ///< made if need be
     std::string programs;              ///< folder of vlx-trace, vlx-krige, vlx-pack
     std::vector<SweepMethod> methods;  ///< none: only samplings
@@ -82,13 +85,17 @@ struct SweepSampling {
 /// "16 spp", "tolerance 0.1".
 std::string samplingText(const SweepSampling& sampling);
 
+/// The file of the frame that stands for all where one is shown, the middle one. Without frames: the name.
+std::string shownFrame(const SweepOptions& options, const std::string& pattern);
+
 enum class SweepKind {
     Sampling,    ///< a dump was traced, or taken from the input
     Image,       ///< an image was made of it
     Inspection,  ///< regions were looked at
 };
 
-/// One command that was run, and what came out: one line of results.jsonl.
+/// One command that was run, and what came out: one line of results.jsonl. With frames it is of all of them:
+/// seconds and bytes are sums, errors means.
 struct SweepRecord {
     std::string key;  ///< hash of all that the result depends on
     SweepKind kind = SweepKind::Image;
@@ -110,10 +117,12 @@ struct SweepRecord {
     /// where the image has a stddev layer, or where there is no reference (assess_image.h), with a reference
     /// also exact_pixels, those without error that know it; floor, the relMSE that a reference with a stddev
     /// layer adds by its own noise, on average; sigma where the command has one. Of Sampling by vlx-trace:
-    /// trace_cpu_seconds, write_cpu_seconds.
+    /// trace_cpu_seconds, write_cpu_seconds. With frames and a reference also flicker (sequence.h), as the
+    /// picture lies.
     std::map<std::string, double> values;
     std::optional<Reliability> reliability;  ///< with a reference and a stddev layer
-    std::string file;  ///< kept image, or regions' JSON, relative to the folder; may be empty
+    /// Kept image, with frames a pattern, or regions' JSON, relative to the folder; may be empty.
+    std::string file;
 };
 
 std::string toJsonLine(const SweepRecord& record);

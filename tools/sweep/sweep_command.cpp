@@ -16,6 +16,21 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+/// The JSON objects that a text consists of; none where it is something else.
+std::vector<Json> objectsOf(const std::string& text) {
+    std::vector<Json> objects;
+    std::istringstream stream(text);
+    while (stream >> std::ws && !stream.eof()) try {
+            Json object;
+            stream >> object;
+            if (!object.is_object()) return {};
+            objects.push_back(std::move(object));
+        } catch (const Json::exception&) {
+            return {};
+        }
+    return objects;
+}
+
 }  // namespace
 
 std::string filled(std::string text, const std::map<std::string, std::string>& places) {
@@ -46,25 +61,25 @@ std::string namedFiles(const std::string& command) {
 
 std::string numberText(double value) { return formatted("%.6g", value); }
 
-Json reportOf(const ProcessRun& run, const std::string& command) {
-    Json report = Json::parse(run.out, nullptr, false);
-    if (!report.is_object()) throw Error(command, "expected a JSON report on standard output");
-    return report;
+std::vector<Json> reportsOf(const ProcessRun& run, const std::string& command) {
+    std::vector<Json> reports = objectsOf(run.out);
+    if (reports.empty()) throw Error(command, "expected a JSON report on standard output");
+    return reports;
 }
+
+Json reportOf(const ProcessRun& run, const std::string& command) { return reportsOf(run, command).front(); }
 
 std::map<std::string, double> stagesOf(const ProcessRun& run) {
     std::map<std::string, double> stages;
-    const Json report = Json::parse(run.out, nullptr, false);
-    if (report.is_object()) {
+    for (const Json& report : objectsOf(run.out))
         if (const auto seconds = report.find("seconds"); seconds != report.end() && seconds->is_object()) {
             for (const auto& [stage, value] : seconds->items())
-                if (value.is_number()) stages[stage] = value;
+                if (value.is_number()) stages[stage] += value.get<double>();
         } else {
             for (const auto& [field, stage] : {std::pair{"readSeconds", "read"}, {"solveSeconds", "solve"}})
                 if (const auto value = report.find(field); value != report.end() && value->is_number())
-                    stages[stage] = *value;
+                    stages[stage] += value->get<double>();
         }
-    }
     double rest = run.seconds;
     for (const auto& [stage, value] : stages) rest -= value;
     stages["other"] = std::max(0.0, rest);

@@ -3,6 +3,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "process/child_process.h"
 
@@ -19,7 +20,8 @@ std::string namedFiles(const std::string& command);
 
 std::string numberText(double value);
 
-/// What a program of ours printed with --json.
+/// What a program of ours printed with --json: one report, of frames one each.
+std::vector<nlohmann::ordered_json> reportsOf(const ProcessRun& run, const std::string& command);
 nlohmann::ordered_json reportOf(const ProcessRun& run, const std::string& command);
 
 /// Wall seconds of the parts of its time, as it reports them; "other" is the rest.

@@ -71,8 +71,7 @@ double exactPixels(const Image& colour, const Image& stddev, const ReferenceImag
     return exact;
 }
 
-Image errorImage(const Image& colour, const std::optional<Image>& stddev,
-                 const std::optional<ReferenceImage>& reference) {
+Image errorImage(const Image& colour, const std::optional<Image>& stddev, const ReferenceImage* reference) {
     if (!reference) return stddev ? *stddev : Image(colour.data, colour.channels);
     Image error = colour;
     for (std::size_t i = 0; i < error.pixels.size(); ++i)

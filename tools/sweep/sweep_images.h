@@ -27,7 +27,6 @@ std::vector<std::pair<int, int>> inspectedPixels(const Image& error, int count);
 double exactPixels(const Image& colour, const Image& stddev, const ReferenceImage& reference);
 
 /// |x - r|, or without a reference the predicted error.
-Image errorImage(const Image& colour, const std::optional<Image>& stddev,
-                 const std::optional<ReferenceImage>& reference);
+Image errorImage(const Image& colour, const std::optional<Image>& stddev, const ReferenceImage* reference);
 
 }  // namespace vlx

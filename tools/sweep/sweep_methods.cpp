@@ -20,6 +20,7 @@ const std::vector<SweepMethod>& builtInMethods() {
          .hierarchical = true,
          .inspectable = true},
         {.name = "krige-high", .command = krige + "--method krige --quality high"},
+        {.name = "krige-temporal", .command = krige + "--method krige --temporal 2", .ofSequences = true},
     };
     return methods;
 }

@@ -79,7 +79,7 @@ Json settingJson(const Sweep& sweep, const SweepSetting& s) {
         const SweepRecord& record = sweep.records[i];
         if (record.reliability) json["reliability"].push_back(toJson(*record.reliability));
         if (!record.file.empty() && record.seed == 1)
-            json["image"] = imageJson(sweep.options.folder + "/" + record.file);
+            json["image"] = imageJson(sweep.options.folder + "/" + shownFrame(sweep.options, record.file));
     }
     return json;
 }
@@ -103,6 +103,8 @@ Json inspectionsJson(const Sweep& sweep) {
 Json pageData(const Sweep& sweep, const SweepSummary& summary, const SweepPageOptions& options) {
     Json data = {{"input", sweep.options.input},
                  {"reference", sweep.options.reference},
+                 {"frames", sweep.options.frames},
+                 {"shownFrame", shownFrame(sweep.options, "#")},
                  {"fromDump", sweep.fromDump},
                  {"imageTimesOnly", summary.imageTimesOnly},
                  {"date", sweep.date},
@@ -148,7 +150,8 @@ Json pageData(const Sweep& sweep, const SweepSummary& summary, const SweepPageOp
     data["crops"] = Json::array();
     for (const Window& crop : options.crops)
         data["crops"].push_back({crop.x, crop.y, crop.width, crop.height});
-    if (!sweep.options.reference.empty()) data["referenceImage"] = imageJson(sweep.options.reference);
+    if (!sweep.options.reference.empty())
+        data["referenceImage"] = imageJson(shownFrame(sweep.options, sweep.options.reference));
     data["inspections"] = inspectionsJson(sweep);
     return data;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "frames.h"
 #include "process/child_process.h"
 #include "sweep/sweep_command.h"
 #include "variolux/base/error.h"
@@ -26,11 +27,19 @@ void sortedOnce(std::vector<Value>& values) {
     values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
+std::vector<int> sortedFrames(const std::string& text) {
+    std::vector<int> frames = parseFrames(text);
+    std::sort(frames.begin(), frames.end());
+    return frames;
+}
+
 void readReference(SweepPlan& plan) {
-    const Image image = readImage(plan.options.reference);
-    plan.reference = ReferenceImage{colourOf(image, plan.options.reference), {}};
-    if (hasLayer(image, kStddev)) plan.reference->stddev = colourOf(image, plan.options.reference, kStddev);
-    plan.referenceIdentity = fileFingerprint(plan.options.reference);
+    for (const std::string& path : plan.files(plan.options.reference)) {
+        const Image image = readImage(path);
+        ReferenceImage& reference = plan.references.emplace_back(ReferenceImage{colourOf(image, path), {}});
+        if (hasLayer(image, kStddev)) reference.stddev = colourOf(image, path, kStddev);
+        plan.referenceIdentity += fileFingerprint(path);
+    }
 }
 
 /// Finds the program, and what tells this version of it from others.
@@ -51,8 +60,8 @@ void identify(SweepPlan& plan, const std::string& program) {
 }
 
 void prepareScene(SweepPlan& plan) {
-    if (plan.reference) {
-        const Window& window = plan.reference->colour.display;  // of a crop, the whole picture
+    if (!plan.references.empty()) {
+        const Window& window = plan.references.front().colour.display;  // of a crop, the whole picture
         if (plan.options.width == 0) plan.options.width = window.width;
         if (plan.options.height == 0) plan.options.height = window.height;
         if (plan.options.width != window.width || plan.options.height != window.height)
@@ -71,7 +80,7 @@ void prepareDump(SweepPlan& plan) {
     const Json info = reportOf(run, "vlx-pack info");
     const Window window{info.at("dataWindow").at("x"), info.at("dataWindow").at("y"),
                         info.at("dataWindow").at("width"), info.at("dataWindow").at("height")};
-    if (plan.reference) plan.requireReferenceWindow(window);
+    plan.requireReferenceWindow(window);
     plan.dumpSamples = info.at("samples").at("min");
     const int replicates = info.at("samples").at("replicates");
     if (plan.dumpSamples < 1)
@@ -124,6 +133,17 @@ int SweepPlan::countSteps() const {
     return steps;
 }
 
+std::string SweepPlan::imageName(const std::string& name) const {
+    return name + (frames.empty() ? ".exr" : "_####.exr");
+}
+
+std::vector<std::string> SweepPlan::files(const std::string& pattern) const {
+    if (frames.empty()) return {pattern};
+    std::vector<std::string> names;
+    for (const int frame : frames) names.push_back(frameName(pattern, frame));
+    return names;
+}
+
 std::string SweepPlan::samplingCommand(const SweepSampling& sampling, int seed) const {
     const std::string input = shellQuoted(options.input);
     if (fromDump)  // the parts of one division are disjoint
@@ -135,14 +155,17 @@ std::string SweepPlan::samplingCommand(const SweepSampling& sampling, int seed) 
     if (options.width > 0) command += " --width " + std::to_string(options.width);
     if (options.height > 0) command += " --height " + std::to_string(options.height);
     if (options.threads > 0) command += " --threads " + std::to_string(options.threads);
+    if (!frames.empty()) command += " --frames " + options.frames;
     return command + (options.traceArguments.empty() ? "" : " " + options.traceArguments);
 }
 
 std::string SweepPlan::methodCommand(const SweepMethod& method, const SweepSampling& sampling,
                                      int seed) const {
+    const bool asSequence = !frames.empty() && firstWord(method.command) == "vlx-krige";
     return filled(method.command, {{"spp", numberText(sampling.setting)},
                                    {"seed", std::to_string(seed)},
-                                   {"threads", std::to_string(options.threads)}});
+                                   {"threads", std::to_string(options.threads)}}) +
+           (asSequence ? " --frames " + options.frames : "");
 }
 
 std::string SweepPlan::executable(const std::string& command) const {
@@ -168,16 +191,22 @@ std::string SweepPlan::imageKey(const std::string& sampling, const SweepMethod& 
         .add("sampling", sampling)
         .add("reference", referenceIdentity)
         .add("program", programs.at(firstWord(command)).second)
-        .add("judge", reference ? "" : programs.at("vlx-krige").second)  // assess_image.h
+        .add("judge", !references.empty() ? "" : programs.at("vlx-krige").second)  // assess_image.h
         .add("files", methodFiles.at(method.name))
         .text();
 }
 
 void SweepPlan::requireReferenceWindow(const Window& window) const {
-    const Window& found = reference->colour.data;
-    if (!(found == window))
-        throw Error(options.reference,
-                    "expected the dump's " + windowText(window) + ", found " + windowText(found));
+    for (const ReferenceImage& reference : references)
+        if (!(reference.colour.data == window))
+            throw Error(options.reference, "expected the dump's " + windowText(window) + ", found " +
+                                               windowText(reference.colour.data));
+}
+
+std::string shownFrame(const SweepOptions& options, const std::string& pattern) {
+    if (options.frames.empty()) return pattern;
+    const std::vector<int> frames = sortedFrames(options.frames);
+    return frameName(pattern, frames[frames.size() / 2]);
 }
 
 SweepPlan planSweep(SweepOptions options, const std::function<void(const std::string&)>& log) {
@@ -189,12 +218,13 @@ SweepPlan planSweep(SweepOptions options, const std::function<void(const std::st
         throw Error(plan.options.input, "expected a scene (.glb, .gltf) or a sample dump (.exr)");
     plan.fromDump = !scene;
     if (plan.options.seeds < 1) throw Error("", "expected at least one seed");
+    if (!plan.options.frames.empty()) plan.frames = sortedFrames(plan.options.frames);
     plan.inputIdentity = fileFingerprint(plan.options.input);
     if (!plan.options.reference.empty()) readReference(plan);
     for (const char* program : {"vlx-trace", "vlx-pack", "vlx-krige"}) identify(plan, program);
     for (auto* methods : {&plan.options.methods, &plan.options.variations}) {
         std::erase_if(*methods, [&](const SweepMethod& m) {
-            const bool unknown = !plan.reference && m.command.find("{sigma}") != std::string::npos;
+            const bool unknown = plan.references.empty() && m.command.find("{sigma}") != std::string::npos;
             if (unknown && log)
                 log(m.name + " is left out: its best sigma can only be told with a reference");
             return unknown;

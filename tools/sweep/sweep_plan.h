@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,7 +21,8 @@ struct SweepPlan {
     bool fromDump = false;
     bool samplingTimeKnown = true;
     std::vector<SweepSampling> samplings;
-    std::optional<ReferenceImage> reference;
+    std::vector<int> frames;                 ///< none: one picture
+    std::vector<ReferenceImage> references;  ///< one a frame, or one; none: no reference
     std::string inputIdentity, referenceIdentity;
     std::map<std::string, std::pair<std::string, std::string>> programs;  ///< name -> path, identity
     std::map<std::string, std::string> methodFiles;                       ///< by method
@@ -33,6 +33,10 @@ struct SweepPlan {
     int repetitions(const SweepSampling& sampling) const;
     std::vector<const SweepMethod*> methodsFor(const SweepSampling& sampling) const;
     int countSteps() const;
+    /// NAME.exr; with frames a pattern.
+    std::string imageName(const std::string& name) const;
+    /// The files of a pattern's frames; without frames its name alone.
+    std::vector<std::string> files(const std::string& pattern) const;
 
     // Commands as people read them, with places for {input} and {output}.
     std::string samplingCommand(const SweepSampling& sampling, int seed) const;

@@ -261,6 +261,7 @@ const std::vector<SweepMeasure>& sweepMeasures() {
         {"mape", "MAPE", true},
         {"rmse_tm", "tone-mapped RMSE", true},
         {"dssim", "1 - SSIM", true},
+        {"flicker", "flicker of frames", true},
         {"predicted_relmse", "relMSE predicted by the error map", false},
         {"predicted_rmse", "RMSE predicted by the error map", false}};
     return measures;

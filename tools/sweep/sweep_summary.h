@@ -18,7 +18,7 @@ struct SweepMeasure {
     bool needsReference = true;
 };
 
-/// relmse, relmse_trimmed, rmse, mape, rmse_tm, dssim, predicted_rmse, predicted_relmse.
+/// relmse, relmse_trimmed, rmse, mape, rmse_tm, dssim, flicker, predicted_rmse, predicted_relmse.
 const std::vector<SweepMeasure>& sweepMeasures();
 
 /// One method at one sampling, over its repetitions. Errors, times and ratios are geometric means, the other

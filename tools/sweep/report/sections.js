@@ -166,6 +166,7 @@ function drawKnobs(data, state) {
 function drawAbout(data) {
   const machine = data.machine, loads = data.loads.filter((l) => l !== null);
   $('about').textContent = `${data.reference ? `Measured against ${data.reference.split('/').pop()}` : 'No reference: errors are those that the error maps predict'}; ` +
+    (data.frames ? `frames ${data.frames}, errors are means over them and times sums, images are of frame ${data.shownFrame}; ` : '') +
     `${data.fromDump ? 'sub-sets of one dump' : 'traced anew for each run'}, ${data.seeds} repetition${data.seeds > 1 ? 's' : ''}. ${data.date}, ${machine.processor}, ${machine.processors} processors.`;
   const commands = [...new Set(data.settings.flatMap((s) => [s.samplingCommand, s.command]).filter((c) => c))];
   $('machine').replaceChildren(
