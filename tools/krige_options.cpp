@@ -175,11 +175,13 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
            "Krige these frames, for example 1-100x2,150: #### in the names of files stands for the frame's "
            "number. When a frame fails the others go on")
         ->option_text("LIST");
-    app.add_option("--temporal", o.krige.temporal,
-                   "krige: with --frames: data of as many frames before and after, as far as there are such "
-                   "files (within --frames or not), add to each frame, moved by the dumps' motion vectors, "
-                   "or as they lie where there are none. What was hidden or has changed loses its weight. "
-                   "Pixels do not depend on how frames are shared out to processes")
+    app.add_option(
+           "--temporal", o.krige.temporal,
+           "krige: with --frames: data of N frames before and N after add to each frame (near the ends "
+           "of a shot more on the other side), as far as there are such files, within --frames or "
+           "not. They are moved by the dumps' motion vectors, or used as they lie where there are "
+           "none. What was hidden or has changed loses its weight. Memory: 2 N + 1 whole frames. "
+           "Pixels do not depend on how frames are shared out to processes")
         ->check(CLI::Range(0, kMostTemporal))
         ->option_text("N")
         ->capture_default_str();

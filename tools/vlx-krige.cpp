@@ -154,13 +154,14 @@ class Shot {
     // What the result depends on besides the frame's own files. Frames that have become others are forgotten.
     std::vector<std::string> filesAround(int number) {
         std::vector<std::string> files;
-        for (const int step : {-1, 1})
-            for (int k = 1; k <= options_.krige.temporal; ++k) {
-                const vlx::KrigeOptions one = frame(number + step * k);
-                if (number + step * k < 0 || !std::filesystem::exists(one.input)) break;
-                files.push_back(one.input);
-                for (const std::string& file : one.moments.files()) files.push_back(file);
-            }
+        const vlx::FramesAround around = vlx::framesAround(
+            number, options_.krige.temporal, [&](int i) { return std::filesystem::exists(frame(i).input); });
+        for (int i = number - around.before; i <= number + around.after; ++i) {
+            if (i == number) continue;
+            const vlx::KrigeOptions one = frame(i);
+            files.push_back(one.input);
+            for (const std::string& file : one.moments.files()) files.push_back(file);
+        }
         for (auto at = read_.begin(); at != read_.end();)
             if (at->second != identity(at->first)) {
                 sequence_.forget(at->first);

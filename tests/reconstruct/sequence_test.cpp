@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <set>
 
 #include "variolux/base/error.h"
 #include "variolux/base/parallel.h"
@@ -126,7 +127,26 @@ TEST(Sequence, SamePixelsInAnyOrderAndForAnyThreadsAndBands) {
 TEST(Sequence, AStillShotGains) {
     MadeUpShot shot;
     EXPECT_LT(shot.ratio(4), 0.5);
-    EXPECT_LT(shot.ratio(1), 0.7) << "two frames after it";
+    EXPECT_LT(shot.ratio(1), 0.5) << "four frames after it";
+}
+
+TEST(Sequence, TheWindowIsShiftedNearTheEnds) {
+    const auto around = [](int frame, int temporal, std::set<int> frames) {
+        const FramesAround of = framesAround(frame, temporal, [&](int i) { return frames.contains(i); });
+        return std::pair(of.before, of.after);
+    };
+    const std::set<int> shot = {0, 1, 2, 3, 4, 5, 6, 8, 9};
+    EXPECT_EQ(around(3, 2, shot), std::pair(2, 2));
+    EXPECT_EQ(around(3, 0, shot), std::pair(0, 0));
+    EXPECT_EQ(around(0, 2, shot), std::pair(0, 4));
+    EXPECT_EQ(around(1, 2, shot), std::pair(1, 3));
+    EXPECT_EQ(around(6, 2, shot), std::pair(4, 0)) << "what comes after a missing frame is another shot";
+    EXPECT_EQ(around(8, 2, shot), std::pair(0, 1));
+    EXPECT_EQ(around(3, 8, shot), std::pair(3, 3));
+    MadeUpShot made;
+    made.last = 4;
+    EXPECT_EQ(made.sequence({.temporal = 2}).reconstruct(4).report.drift().frames, 3);
+    EXPECT_EQ(made.sequence({.temporal = 1}).reconstruct(4).report.drift().frames, 2);
 }
 
 TEST(Sequence, MotionBringsDataTogether) {

@@ -8,6 +8,14 @@
 /// Frames of a sequence, kriged with data of the frames around them: drift.h, 10.
 namespace vlx {
 
+/// How many frames before `frame`, and how many after it, add to it.
+struct FramesAround {
+    int before = 0, after = 0;
+};
+/// Of a window of 2 `temporal` + 1 frames: as many on either side, or, near the first or the last frame of a
+/// shot, so many more on the other; up to the first that is not there. No frame is below 0.
+FramesAround framesAround(int frame, int temporal, const std::function<bool(int)>& exists);
+
 /// Holds what the samples of a window of frames say, each whole: about 60 floats a pixel of each with albedo,
 /// normal and depth (1920 x 1080 pixels: 0.5 GB).
 class Sequence {
@@ -15,7 +23,7 @@ class Sequence {
     /// The samples of a frame; null where there is no such frame. May throw Error.
     using Open = std::function<std::unique_ptr<SampleSource>(int frame)>;
 
-    /// Drift::temporal frames before and after a frame, up to the first that is not there, add to it.
+    /// framesAround() of Drift::temporal add to each frame.
     Sequence(Open open, const Drift& options);
     ~Sequence();
     Sequence(const Sequence&) = delete;

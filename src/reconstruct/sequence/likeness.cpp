@@ -20,7 +20,7 @@ struct ApartPlanes {
     static constexpr int around(int half) { return 6 + half; }  // squares of means of differences
     static constexpr int aroundKnown(int half) { return 8 + half; }
     static constexpr int kBeyond = 10, kBeyondKnown = 11;  // squares that features differ by
-    static constexpr int kUnlike = 12;                     // by features and motion
+    static constexpr int kUnlike = 12;                     // by motion
     static constexpr int kChannels = 13;
 };
 
@@ -32,8 +32,8 @@ constexpr float kMeanArea = (2 * kMeanReach + 1) * (2 * kMeanReach + 1);
 constexpr int kWideReach = 10;  // a change too small to be seen in a patch is in more pixels
 // Kriging leaves a twentieth of a datum's variance, or less: what a merged one is off by must be as small.
 constexpr float kSharpness = 20;
-// Wider than within a frame: the features are merged too, and the drift explains what they differ by.
-constexpr float kWidth2 = 0.35f * 0.35f;
+// A pixel that knows its features wants their like; within four standard errors of its own others may be.
+constexpr float kOwnErrors = 16, kTheirErrors = 2;
 // Of what lies beyond the four pixels in many pixels, which no interpolation explains.
 constexpr float kBeyondWidth2 = 0.03f * 0.03f;
 constexpr int kComparedRows = 112;  // those filled at a time, and windows around
@@ -88,6 +88,22 @@ void Likeness::fill(int end) {
     comparedRows_ = compared;
     parallelFor(averagedRows_, averaged, [&](std::int64_t y) { averageRow(static_cast<int>(y)); });
     averagedRows_ = averaged;
+}
+
+float Likeness::featureWeight(int x, int y, std::size_t k, int column, int row) const {
+    const auto w = static_cast<std::size_t>(width_);
+    const float* const mine = frame_.frame().fine().features().row(0, y) + x;
+    const float* const theirs = neighbour(k).frame->frame().fine().features().row(0, row) + column;
+    const std::vector<float>& scale = neighbour(k).frame->frame().layout().scale;
+    float distance = 0;
+    for (int f = 0; f < layout_.features; ++f) {
+        const auto i = static_cast<std::size_t>(f), error = static_cast<std::size_t>(features_.error(f));
+        const float ratio = scale[i] / layout_.scale[i];
+        const float d = mine[i * w] - rescaled(theirs[i * w], ratio);
+        const float u1 = mine[error * w], u2 = ratio * ratio * theirs[error * w];
+        distance += (d * d - u1 - u2) / (kFeatureWidth2 + kOwnErrors * u1 + kTheirErrors * u2);
+    }
+    return std::exp(-std::max(0.f, distance));
 }
 
 bool Likeness::place(int x, int y, std::size_t k, float* column, float* row) const {
@@ -184,16 +200,13 @@ void Likeness::compareRow(int y, std::size_t k, const std::vector<float>& places
             out(ApartPlanes::difference(half))[x] = std::clamp(difference / deviation, -kWild, kWild);
             out(ApartPlanes::known(half))[x] = 1;
         }
-        const float *const fa = at(own.features(), y, x), *const fb = at(other.features(), row, col);
+        const float* const fa = at(own.features(), y, x);
         const std::array<Corner, 4> corners = cornersOf(place[0], place[1], width_, height_);
-        float distance = 0, squares = 0, noise = 0, sum = kLeastSquare;
+        float squares = 0, noise = 0, sum = kLeastSquare;
         for (int f = 0; f < layout_.features; ++f) {
             const auto i = static_cast<std::size_t>(f);
             const float ratio = scale[i] / layout_.scale[i];
             const float mine = fa[plane(f)], error = fa[plane(features_.error(f))];
-            const float d = mine - rescaled(fb[plane(f)], ratio);
-            const float u = error + ratio * ratio * fb[plane(features_.error(f))];
-            distance += (d * d - u) / (kWidth2 + 2 * u);
             float least = kFar, most = -kFar, spread = error;
             for (const auto& [c, r, part] : corners) {
                 const float* const of = at(other.features(), r, c);
@@ -209,7 +222,6 @@ void Likeness::compareRow(int y, std::size_t k, const std::vector<float>& places
         }
         out(ApartPlanes::kBeyond)[x] = std::min(kWild * kWild, (squares - noise) / sum);
         out(ApartPlanes::kBeyondKnown)[x] = a[plane(planes_.count())] > 0 && b[plane(planes_.count())] > 0;
-        out(ApartPlanes::kUnlike)[x] += std::max(0.f, distance);
     }
 }
 

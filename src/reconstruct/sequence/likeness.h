@@ -28,8 +28,8 @@ std::array<Corner, 4> cornersOf(float column, float row, int width, int height);
 float rescaled(float value, float ratio);
 
 /// Of each neighbour and pixel: the place there, by the motion of one frame after the other, and the weight
-/// of what is there,
-///     w = exp(-20 d - f - m).
+/// of each of the four pixels around it,
+///     w = exp(-20 d - f - m),    0 where that is below 0.01.
 ///  - d of the *other* half, so that weights are independent of what they weigh: how far its means are apart
 ///  in
 ///    units of noise. With e = sum of dz / sum of sqrt(v1 + v2) over the colours, v error variances, at most
@@ -39,9 +39,10 @@ float rescaled(float value, float ratio);
 ///  - d has the same of features, which show what colours are too noisy for: the means over 7 x 7 and 21 x 21
 ///    pixels of (|df|^2 - u) / (0.03^2 + u), df what a feature is beyond the range of the four pixels there
 ///    (so that no interpolation explains it), u the error variances of both; at most 9.
-///  - f of the features of the pixel, sum of (df^2 - (u1 + u2)) / (0.35^2 + 2 (u1 + u2)), at least 0: wide,
-///  as
-///    features are merged too, and the drift explains what they differ by.
+///  - f of the features of the pixel there, sum of (df^2 - (u1 + u2)) / (0.2^2 + 16 u1 + 2 u2), at least 0,
+///  u1
+///    the own pixel's error variances: one that knows its features (a thin bar before a window) wants their
+///    like, one at an edge takes what it may be.
 ///  - m = |motion there and back|^2, in pixels: what was hidden goes elsewhere.
 class Likeness {
   public:
@@ -59,8 +60,10 @@ class Likeness {
     void fill(int end);
     /// Where the point of pixel (x, y) is in neighbour k; false: not in its picture.
     bool place(int x, int y, std::size_t k, float* column, float* row) const;
-    /// Of row y: of each neighbour and half the weights of its pixels, 0 where there is no place.
+    /// Of row y: exp(-20 d - m), of each neighbour and half for its pixels; 0 where there is no place.
     std::vector<float> weightsOf(int y) const;
+    /// exp(-f) of pixel (x, y) and that at (column, row) of neighbour k.
+    float featureWeight(int x, int y, std::size_t k, int column, int row) const;
     std::uint64_t ringBytes() const { return apart_.bytes(); }
 
   private:

@@ -1,7 +1,9 @@
 #include "reconstruct/sequence/merge.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "reconstruct/drift/centre.h"
 #include "variolux/base/parallel.h"
 
 namespace vlx {
@@ -55,17 +57,21 @@ void Merge::addTaps(int x, int y, std::size_t k, const std::vector<float>& weigh
     const std::size_t at = 2 * k * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
     const float weight[2] = {weights[at], weights[at + static_cast<std::size_t>(width_)]};
     float column, row;
-    if (!likeness_.place(x, y, k, &column, &row) || (weight[0] <= 0 && weight[1] <= 0)) return;
+    if (!likeness_.place(x, y, k, &column, &row) || std::max(weight[0], weight[1]) < kLeastWeight) return;
     const Frame& frame = likeness_.neighbour(k).frame->frame();
     const PixelRows& of = frame.fine().pixels();
     for (const auto& [c, r, part] : cornersOf(column, row, width_, frame_.frame().height())) {
         if (part <= 0 || of.data.row(planes_.count(), r)[c] <= 0) continue;
+        const float like = likeness_.featureWeight(x, y, k, c, r);
+        const auto whole = [&](int half) {
+            return like * weight[half] < kLeastWeight ? 0 : part * like * weight[half];
+        };
         taps.push_back({of.data.row(0, r) + c,
                         of.squares.row(0, r) + c,
                         layout_.features > 0 ? of.raw.row(0, r) + c : nullptr,
                         &frame.layout().scale,
                         part,
-                        {part * weight[0], part * weight[1]}});
+                        {whole(0), whole(1)}});
     }
 }
 
@@ -126,8 +132,9 @@ void Merge::mergeRow(int y, PixelRows& out) const {
             for (const Tap& of : taps) to[p] += part(of) * of.data[p];
         }
         for (int p = 0; p < SquaresPlanes::kChannels; ++p) {
+            const bool squared = p == SquaresPlanes::kAllSquared;  // of a sum
             float sum = 0;
-            for (const Tap& of : taps) sum += share(of) * of.squares[plane(p)];
+            for (const Tap& of : taps) sum += (squared ? share(of) : 1) * share(of) * of.squares[plane(p)];
             out.squares.row(p, y)[x] = sum;
         }
         for (int f = 0; f < layout_.features; ++f) {

@@ -73,21 +73,29 @@ struct Sequence::Impl {
     Drift options;
     std::map<int, std::unique_ptr<LoadedFrame>> frames;  // null: there is no such frame
 
+    std::map<int, std::unique_ptr<SampleSource>> opened;  // those of them that are not loaded yet
+
+    bool exists(int frame) {
+        const auto found = frames.find(frame);
+        if (found != frames.end()) return found->second != nullptr;
+        std::unique_ptr<SampleSource>& source = opened[frame];
+        if (!source) source = open(frame);
+        return source != nullptr;
+    }
     LoadedFrame* load(int frame) {
         const auto found = frames.find(frame);
         if (found != frames.end()) return found->second.get();
         std::unique_ptr<LoadedFrame> loaded;
-        if (std::unique_ptr<SampleSource> source = open(frame))
-            loaded = std::make_unique<LoadedFrame>(std::move(source), options);
+        if (exists(frame)) loaded = std::make_unique<LoadedFrame>(std::move(opened[frame]), options);
+        opened.erase(frame);
         return (frames[frame] = std::move(loaded)).get();
     }
-    /// Frames beside `frame`, the nearest first, up to one that is not there.
-    std::vector<Neighbour> beside(int frame, int step) {
+    /// The `count` frames beside `frame`, the nearest first.
+    std::vector<Neighbour> beside(int frame, int step, int count) {
         std::vector<Neighbour> found;
         const LoadedFrame& own = *load(frame);
-        for (int k = 1; k <= options.temporal && frame + step * k >= 0; ++k) {
+        for (int k = 1; k <= count; ++k) {
             LoadedFrame* const there = load(frame + step * k);
-            if (!there) break;
             requireAlike(*there, own);
             there->timed = true;
             found.push_back({&there->samples, sameSeed(*there, own)});
@@ -96,16 +104,33 @@ struct Sequence::Impl {
     }
 };
 
-Sequence::Sequence(Open open, const Drift& options) : impl_(new Impl{std::move(open), options, {}}) {}
+FramesAround framesAround(int frame, int temporal, const std::function<bool(int)>& exists) {
+    FramesAround around;
+    const auto extend = [&](int& count, int step, int most) {
+        while (count < most && frame + step * (count + 1) >= 0 && exists(frame + step * (count + 1))) ++count;
+    };
+    extend(around.before, -1, temporal);
+    extend(around.after, 1, 2 * temporal - around.before);
+    extend(around.before, -1, 2 * temporal - around.after);
+    return around;
+}
+
+Sequence::Sequence(Open open, const Drift& options) : impl_(new Impl{std::move(open), options, {}, {}}) {}
 Sequence::~Sequence() = default;
 
-void Sequence::forget(int frame) { impl_->frames.erase(frame); }
+void Sequence::forget(int frame) {
+    impl_->frames.erase(frame);
+    impl_->opened.erase(frame);
+}
 
 ReconstructionReport Sequence::reconstruct(int frame, const RowSink& sink, const Progress& progress) {
-    const int reach = impl_->options.temporal;
+    const auto around = framesAround(frame, impl_->options.temporal, [&](int i) { return impl_->exists(i); });
+    const int first = frame - around.before, last = frame + around.after;
     std::erase_if(impl_->frames, [&](const auto& entry) {
-        return entry.first < frame - reach || entry.first > frame + reach || !entry.second;
+        return entry.first < first || entry.first > last || !entry.second;
     });
+    std::erase_if(impl_->opened,
+                  [&](const auto& entry) { return entry.first < first || entry.first > last; });
     LoadedFrame* const own = impl_->load(frame);
     if (!own) throw Error("", "expected frame " + std::to_string(frame) + " of the sequence, found none");
     ReconstructionReport report;
@@ -113,7 +138,8 @@ ReconstructionReport Sequence::reconstruct(int frame, const RowSink& sink, const
     if (!own->timed) drift.seconds = own->seconds;
     own->timed = true;
     StageClock clock(drift.seconds);
-    const std::vector<Neighbour> before = impl_->beside(frame, -1), after = impl_->beside(frame, 1);
+    const std::vector<Neighbour> before = impl_->beside(frame, -1, around.before),
+                                 after = impl_->beside(frame, 1, around.after);
     clock.addTo("other frames");
     Merge merge(own->samples, before, after);
     const Frame& plain = own->samples.frame();
