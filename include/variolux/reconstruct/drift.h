@@ -71,8 +71,7 @@
 ///    was at a pixel's point, by its motion from frame to frame, is interpolated between the four pixels
 ///    around, and weighted by exp(-20 d - f - m): d what the other half's colours and the features around
 ///    differ by, f what those of the pixel do, m the square of what motion there and back does, in pixels. A
-///    frame's own data weigh 1. Kriging then sees more samples in a pixel, and the error map counts what they
-///    are worth: (sum w n)^2 / sum w^2 n.
+///    frame's own data weigh 1. Kriging then sees more samples in a pixel, sum w n.
 ///
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
 /// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights

@@ -73,6 +73,15 @@ struct ResidualRegion {
     bool structure = false;  ///< significant at 0.05: neighbouring pixels are wrong together
 };
 
+/// What frames around a frame (sequence.h) add to it.
+struct SequenceReport {
+    int frames = 0;         ///< that are there
+    int wanted = 0;         ///< that the options ask for
+    double gain = 1;        ///< what they make of the number of samples: times as many, on average
+    int equalSeeds = 0;     ///< of `frames`: they sampled with the seed of this one
+    int withoutMotion = 0;  ///< of them and the frame itself: points are taken to stand still there
+};
+
 /// What the default method did.
 struct DriftReport {
     std::int64_t farPixels = 0;       ///< empty, and with no samples within 5 pixels either
@@ -83,16 +92,14 @@ struct DriftReport {
                                       ///< estimate, whether fireflies lost it or not
     double light = 1;                 ///< luminance of the image over that of all samples, as they came:
                        ///< sums over samples (a pixel counts as often as it was sampled); 0: there is none
-    double lightError = 0;                  ///< standard error of the samples', as a share of it
-    std::int64_t neighbourhoods = 0;        ///< kriged, over models and halves
-    std::int64_t ownNeighbourhoods = 0;     ///< centred on pixels unlike their regular centres
-    std::int64_t failedNeighbourhoods = 0;  ///< not solvable: their weighted mean
-    std::int64_t driftFeatures = 0;         ///< sum over neighbourhoods of the features that vary there; the
-                                            ///< others are no drift
-    double driftFunctions = 0;              ///< sum over neighbourhoods of the effective number of functions
-    int frames = 0;                         ///< of a sequence, besides the frame's own, that add to it
-    double framesGain = 1;  ///< what they make of the number of samples: times as many, on average
-    int equalSeeds = 0;     ///< of `frames`: they sampled with the seed of this one
+    double lightError = 0;                   ///< standard error of the samples', as a share of it
+    std::int64_t neighbourhoods = 0;         ///< kriged, over models and halves
+    std::int64_t ownNeighbourhoods = 0;      ///< centred on pixels unlike their regular centres
+    std::int64_t failedNeighbourhoods = 0;   ///< not solvable: their weighted mean
+    std::int64_t driftFeatures = 0;          ///< sum over neighbourhoods of the features that vary there; the
+                                             ///< others are no drift
+    double driftFunctions = 0;               ///< sum over neighbourhoods of the effective number of functions
+    std::optional<SequenceReport> sequence;  ///< of a frame of one
     std::optional<SecondOpinionReport> secondOpinion;  ///< where there was one
     std::map<std::string, double> seconds;             ///< wall time by stage
     std::vector<ResidualRegion> residuals;             ///< row by row; where asked for (Drift::diagnostics)

@@ -41,6 +41,10 @@ struct DataPlanes {
     int channels() const { return 2 * radiance + 8; }
 };
 
+/// What the variance of a sample is divided by for that of a mean of n, which may be less than one (Merge): 1
+/// where there is none.
+inline float samplesIn(float n) { return n > 0 ? n : 1; }
+
 /// Scatter of a pixel's samples.
 struct SquaresPlanes {
     static constexpr int colour(int c) { return c; }  ///< summed squares of R, G, B

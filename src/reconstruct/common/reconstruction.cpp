@@ -41,9 +41,12 @@ nlohmann::ordered_json json(const DriftReport& report) {
         {"driftFeatures", perNeighbourhood(report, static_cast<double>(report.driftFeatures))},
         {"driftFunctions", perNeighbourhood(report, report.driftFunctions)},
         {"seconds", report.seconds}};
-    if (report.frames > 0)
-        document["sequence"] = {
-            {"frames", report.frames}, {"gain", report.framesGain}, {"equalSeeds", report.equalSeeds}};
+    if (const auto& of = report.sequence)
+        document["sequence"] = {{"frames", of->frames},
+                                {"wanted", of->wanted},
+                                {"gain", of->gain},
+                                {"equalSeeds", of->equalSeeds},
+                                {"withoutMotion", of->withoutMotion}};
     if (const auto& of = report.secondOpinion)
         document["secondOpinion"] = {{"validated", of->validated},
                                      {"refused", of->refused},
@@ -180,6 +183,25 @@ std::string lightInWords(const DriftReport& report) {
     return text.str();
 }
 
+std::string inWords(const SequenceReport& of) {
+    std::ostringstream text;
+    if (of.frames == 0)
+        text << "none of the " << of.wanted
+             << " frames around it is there: nothing is added to its samples\n";
+    else
+        text << of.frames << " of " << of.wanted << " frames around it are there: they add "
+             << std::round(100 * (of.gain - 1)) / 100 << " times as many samples as its own\n";
+    if (of.frames > 0 && of.withoutMotion > 0)
+        text << of.withoutMotion << " of these " << of.frames + 1
+             << " have no motion vectors: there data are used as they lie, which is right where nothing "
+                "moves\n";
+    if (of.equalSeeds > 0)
+        text << "WARNING: " << of.equalSeeds
+             << " of them have the same seed: their noise is the same where nothing moves, and counts for "
+                "nothing there; render every frame with a seed of its own\n";
+    return text.str();
+}
+
 std::string inWords(const DriftReport& report) {
     constexpr double kMuchLight = 0.1;
     std::ostringstream text;
@@ -193,13 +215,7 @@ std::string inWords(const DriftReport& report) {
          << std::round(100 * perNeighbourhood(report, report.driftFunctions)) / 100
          << " drift functions on average, "
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
-    if (report.frames > 0)
-        text << report.frames << " frames around count as " << std::round(100 * (report.framesGain - 1)) / 100
-             << " times the frame's own samples\n";
-    if (report.equalSeeds > 0)
-        text << "WARNING: " << report.equalSeeds
-             << " of them have the same seed: their noise is the same where nothing moves, and counts for "
-                "nothing there; render every frame with a seed of its own\n";
+    if (report.sequence) text << inWords(*report.sequence);
     if (const auto& of = report.secondOpinion)
         text << "the kriging weighs " << 100 * of->weight << " %, the other image the rest ("
              << (of->validated         ? "validated on samples that neither had seen"

@@ -117,7 +117,7 @@ void Centre::select(const Surroundings& around, const float* alike) {
     float *const counts = row(3), *const errors = row(4);
     list(tile_.counts, 0, counts);
     list(tile_.errors, 0, errors);
-    const float own = std::max(1.f, tile_.counts[centre_]);
+    const float own = samplesIn(tile_.counts[centre_]);
     const DataWeights sums = weighData(counts, errors, own, kLeastCountRatio, kMostCountRatio, padded(),
                                        predicted_.data(), weights_.data());
     total_ = sums.total;

@@ -38,7 +38,7 @@ double Combination::unit(const Rows& rows, int x) const {
     double variance = 0, level = 0;
     const float n = rows.count[x];
     for (std::size_t c = 0; c < 3; ++c) {
-        variance += 2 * rows.variance[c][x] / std::max(1.f, n) / 3;
+        variance += 2 * rows.variance[c][x] / samplesIn(n) / 3;
         for (const auto& of : rows.estimate)
             for (const auto& half : of) {
                 const double value = half[c][x];
@@ -154,8 +154,7 @@ void Combination::store(const Rows& rows, int x, const StackingVector& weights, 
         // or the other.
         double variance = 0;
         for (std::size_t j = 0; j <= m; ++j) {
-            const double within =
-                j == m ? rows.variance[c][x] / std::max(1.f, n) : rows.modelVariance[c][j][x];
+            const double within = j == m ? rows.variance[c][x] / samplesIn(n) : rows.modelVariance[c][j][x];
             const double d = both(j) - value;
             variance += share(j) * std::max(within, d * d);
         }

@@ -97,7 +97,7 @@ void Finishing::cleanRow(int y) {
         }
         if (excess == 0) continue;
         const double leverage = combined_.row(combinedPlanes_.leverage(), y)[x];
-        const double n = std::max(1.f, data_.row(planes_.count(), y)[x]);
+        const double n = samplesIn(data_.row(planes_.count(), y)[x]);
         for (int c = 0; c < 3; ++c) variance += sampleVariance(c, x, y) / n;
         const double kept = shrinkage(excess, leverage * leverage * variance);
         if (kept >= 1) continue;
@@ -255,7 +255,7 @@ double Finishing::gapVariance(int c, int x, int y) const {
 }
 
 double Finishing::meanVariance(int c, int x, int y) const {
-    return static_cast<double>(variances_.row(c, y)[x]) / std::max(1.f, data_.row(planes_.count(), y)[x]);
+    return static_cast<double>(variances_.row(c, y)[x]) / samplesIn(data_.row(planes_.count(), y)[x]);
 }
 
 /// Whether the dump states that the pixel, and every one that its error variance was pooled over, has none.

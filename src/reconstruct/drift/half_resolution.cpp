@@ -39,7 +39,7 @@ void Correction::differenceRow(int y) {
     }
     const DataPlanes data{planes_.radiance};
     for (int x = 0; x < fine_.width; ++x) {
-        const double n = std::max(1.f, fine_.data.row(data.count(), y)[x]);
+        const double n = samplesIn(fine_.data.row(data.count(), y)[x]);
         double variance = 0, top = 0, gain = 0, square = 0;
         for (int c = 0; c < 3; ++c) {
             variance += 2 * static_cast<double>(fine_.variances.row(c, y)[x]) / n / 3;

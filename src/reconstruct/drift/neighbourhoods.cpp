@@ -74,7 +74,7 @@ class Tile {
             for (int k = 0; k < 3; ++k) {
                 copy(*input.variances, k, guide.variances(k));
                 for (std::size_t i = 0; i < plane(1); ++i) {
-                    const float n = std::max(1.f, counts_[half][i]);
+                    const float n = samplesIn(counts_[half][i]);
                     errors_[half][i] += guide.variances(k)[i] / (3 * n);
                     guide.variances(k)[i] /= n;
                 }

@@ -53,7 +53,8 @@ class FrameKriging::Stages {
   public:
     Stages(const SampleSource& dump, const Drift& options, Frame& frame, ReconstructionReport& report,
            StageClock& clock)
-        : options_(options),
+        : path_(dump.path()),
+          options_(options),
           report_(report),
           drift_(std::get<DriftReport>(report.method)),
           clock_(clock),
@@ -191,12 +192,29 @@ class FrameKriging::Stages {
             lightNoise_ += of.noise;
         }
         for (int y = finishedRows_; y < until && residuals_; ++y) residuals_->addRow(y, drift_);
+        requireNumbers(until - finishedRows_);
         clock_.addTo("finishing");
         sink(rows_.pixels.data(), until - finishedRows_);
         finishedRows_ = until;
         clock_.addTo("output");
     }
 
+    /// Samples that are no numbers are left out: none can come of the others but by a fault here, and a
+    /// picture with holes must not pass for one.
+    void requireNumbers(int count) const {
+        const int channels = rows_.channelCount();
+        for (int row = 0; row < count; ++row)
+            for (int x = 0; x < width_; ++x)
+                for (int c = 0; c < channels; ++c)
+                    if (!std::isfinite(rows_.at(x, row)[c]))
+                        throw Error(path_, "expected numbers, computed one that is not in row " +
+                                               std::to_string(finishedRows_ + row) + ", column " +
+                                               std::to_string(x) +
+                                               ": a fault of this program, please report it; --method mean "
+                                               "averages these samples");
+    }
+
+    std::string path_;
     const Drift& options_;
     ReconstructionReport& report_;
     DriftReport& drift_;  // in it
@@ -228,6 +246,11 @@ FrameKriging::~FrameKriging() = default;
 std::uint64_t FrameKriging::ringBytes() const { return stages_->ringBytes(); }
 
 void FrameKriging::run(const RowSink& sink, const Progress& progress) { stages_->run(sink, progress); }
+
+std::uint64_t bytesBesideRows() {
+    return std::max(kProcessBytes, residentMemory() + kFurtherBytes) +
+           kThreadBytes * static_cast<std::uint64_t>(threadCount());
+}
 
 std::optional<std::string> Drift::validate() const {
     if (!(strength >= 0 && strength <= 1))
@@ -276,10 +299,7 @@ ReconstructionReport reconstructDrift(const SampleSource& dump, const Drift& opt
     SampledFrame samples(dump, options, Kept::Rows, clock);
     FrameKriging kriging(dump, options, samples.frame(), report, clock);
     requireMemory(dump.path(), kriging.ringBytes(), "rows as wide as these");
-    if (options.maxMemory > 0)
-        samples.readWithin(options.maxMemory, std::max(kProcessBytes, residentMemory() + kFurtherBytes) +
-                                                  kriging.ringBytes() +
-                                                  kThreadBytes * static_cast<std::uint64_t>(threadCount()));
+    if (options.maxMemory > 0) samples.readWithin(options.maxMemory, bytesBesideRows() + kriging.ringBytes());
     const Window own = driftOutline(dump, options).data;
     const int first = own.y - dump.header().data.y * options.scale;
     samples.own(first, first + own.height);

@@ -24,4 +24,7 @@ class FrameKriging {
     std::unique_ptr<Stages> stages_;
 };
 
+/// What a process holds besides rows of pictures: libraries, what is resident already, threads' tiles.
+std::uint64_t bytesBesideRows();
+
 }  // namespace vlx

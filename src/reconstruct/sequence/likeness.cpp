@@ -193,7 +193,8 @@ void Likeness::compareRow(int y, std::size_t k, const std::vector<float>& places
             float difference = 0, deviation = 0;  // colours of a sample go together
             for (int c = 0; c < 3; ++c) {
                 const float z = a[plane(planes_.mean(half) + c)], t = b[plane(planes_.mean(half) + c)];
-                const float v = va[plane(c)] / std::max(1.f, n) + vb[plane(c)] / std::max(1.f, m);
+                // Of the two frames' notions of the noise the smaller: large ones are often ignorance.
+                const float v = std::min(va[plane(c)], vb[plane(c)]) * (1 / samplesIn(n) + 1 / samplesIn(m));
                 difference += z - t;
                 deviation += std::sqrt(kLeastSquare + 1e-6f * (z * z + t * t) + v);
             }

@@ -98,12 +98,8 @@ void Merge::mergeRow(int y, PixelRows& out) const {
         }
         float count = 0;
         for (int half = 0; half < 2; ++half) {
-            float total = 0, squares = 0;
-            for (const Tap& of : taps) {
-                const float n = of.data[plane(planes_.halfCount(half))];
-                total += of.weight[half] * n;
-                squares += of.weight[half] * of.weight[half] / of.part * n;
-            }
+            float total = 0;
+            for (const Tap& of : taps) total += of.weight[half] * of.data[plane(planes_.halfCount(half))];
             for (int c = 0; c < layout_.radiance; ++c) {
                 const std::size_t p = plane(planes_.mean(half) + c);
                 float sum = 0;
@@ -111,9 +107,8 @@ void Merge::mergeRow(int y, PixelRows& out) const {
                     sum += of.weight[half] * of.data[plane(planes_.halfCount(half))] * of.data[p];
                 to[p] = total > 0 ? sum / total : taps[0].data[p];
             }
-            const float n = total > 0 ? total * total / squares : 0;
-            to[plane(planes_.halfCount(half))] = n;
-            count += n;
+            to[plane(planes_.halfCount(half))] = total;
+            count += total;
         }
         to[plane(planes_.count())] = count;
         to[plane(planes_.stated())] = taps[0].data[plane(planes_.stated())];

@@ -16,8 +16,9 @@ class Merge : public PixelSource {
 
     void startAbove(int first) override { likeness_.startAbove(first); }
     /// The datum of a pixel's half becomes the mean of its own and those of the K neighbours, weighted by
-    /// w_k (Likeness) and numbers of samples; its count is the effective one,
-    ///     z = sum w n z / sum w n,    n = (sum w n)^2 / sum w^2 n,    w = 1 for its own.
+    /// w_k (Likeness) and numbers of samples; doubt counts as a larger error variance, v / (n w), as in
+    /// neighbourhoods:
+    ///     z = sum w n z / sum w n,    n = sum w n,    w = 1 for its own.
     /// A neighbour's is interpolated between the four pixels around the point's place there. Scatter and
     /// features are merged by the same weights, those of both halves averaged.
     void fill(int first, int end, PixelRows& out) override;

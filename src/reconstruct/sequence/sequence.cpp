@@ -15,28 +15,37 @@ namespace {
 
 /// A frame with all that its samples say.
 struct LoadedFrame {
-    LoadedFrame(std::unique_ptr<SampleSource> dump, const Drift& options)
+    LoadedFrame(std::unique_ptr<SampleSource> dump, const Drift& options, std::uint64_t held)
         : source(std::move(dump)),
           outline(driftOutline(*source, options)),
           clock(seconds),
           samples(*source, options, Kept::Whole, clock) {
         const int first = outline.data.y - source->header().data.y * options.scale;
         samples.own(first, first + outline.data.height);
-        requireFrames(options);
+        requireFrames(options, held);
         samples.frame().fillAll();
     }
 
-    /// That as many as are held at a time fit into memory.
-    void requireFrames(const Drift& options) const {
+    /// That as many as are held at a time fit into memory, with the stages of one that is kriged and the
+    /// frame that they are merged into; what of the limit is left is for reading this one.
+    void requireFrames(const Drift& options, std::uint64_t held) {
         const auto frames = static_cast<std::uint64_t>(2 * options.temporal + 1);
-        const std::uint64_t bytes = frames * samples.frame().ringBytes();
         const std::string what =
             std::to_string(frames) + " frames of this size (--temporal with a smaller number takes less)";
-        requireMemory(source->path(), bytes, what);
-        if (options.maxMemory > 0 && bytes > options.maxMemory)
+        ReconstructionReport report;
+        report.method.emplace<DriftReport>();
+        const std::uint64_t rows =
+            FrameKriging(*source, options, samples.frame(), report, clock).ringBytes() +
+            frames * samples.frame().ringBytes();
+        requireMemory(source->path(), rows, what);
+        if (options.maxMemory == 0) return;
+        // What frames before it hold is in `rows` and resident.
+        const std::uint64_t bytes = rows + bytesBesideRows() - std::min(held, rows);
+        if (bytes > options.maxMemory)
             throw Error(source->path(), "expected a memory limit of at least " +
                                             std::to_string((bytes + 999'999) / 1'000'000) + "M for " + what +
                                             ", found " + std::to_string(options.maxMemory / 1'000'000) + "M");
+        samples.readWithin(options.maxMemory, bytes);
     }
 
     std::unique_ptr<SampleSource> source;
@@ -82,11 +91,18 @@ struct Sequence::Impl {
         if (!source) source = open(frame);
         return source != nullptr;
     }
+    std::uint64_t heldBytes() const {
+        std::uint64_t bytes = 0;
+        for (const auto& [number, frame] : frames)
+            if (frame) bytes += frame->samples.frame().ringBytes();
+        return bytes;
+    }
     LoadedFrame* load(int frame) {
         const auto found = frames.find(frame);
         if (found != frames.end()) return found->second.get();
         std::unique_ptr<LoadedFrame> loaded;
-        if (exists(frame)) loaded = std::make_unique<LoadedFrame>(std::move(opened[frame]), options);
+        if (exists(frame))
+            loaded = std::make_unique<LoadedFrame>(std::move(opened[frame]), options, heldBytes());
         opened.erase(frame);
         return (frames[frame] = std::move(loaded)).get();
     }
@@ -146,10 +162,16 @@ ReconstructionReport Sequence::reconstruct(int frame, const RowSink& sink, const
     Frame merged(plain.layout(), plain.picture(), impl_->options, plain.width(), plain.height(), Kept::Rows,
                  merge, clock);
     FrameKriging(*own->source, impl_->options, merged, report, clock).run(sink, progress);
-    drift.frames = static_cast<int>(before.size() + after.size());
-    drift.framesGain = merge.gain();
+    SequenceReport& of = drift.sequence.emplace();
+    of.wanted = 2 * impl_->options.temporal;
+    of.gain = merge.gain();
+    of.withoutMotion = own->samples.motion().channels() == 0;
     for (const auto* list : {&before, &after})
-        for (const Neighbour& of : *list) drift.equalSeeds += of.sameSeed;
+        for (const Neighbour& neighbour : *list) {
+            ++of.frames;
+            of.equalSeeds += neighbour.sameSeed;
+            of.withoutMotion += neighbour.frame->motion().channels() == 0;
+        }
     return report;
 }
 
