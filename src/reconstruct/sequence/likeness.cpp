@@ -32,8 +32,8 @@ constexpr float kMeanArea = (2 * kMeanReach + 1) * (2 * kMeanReach + 1);
 constexpr int kWideReach = 10;  // a change too small to be seen in a patch is in more pixels
 // Kriging leaves a twentieth of a datum's variance, or less: what a merged one is off by must be as small.
 constexpr float kSharpness = 20;
-// A pixel that knows its features wants their like; within four standard errors of its own others may be.
-constexpr float kOwnErrors = 16, kTheirErrors = 2;
+// A pixel that knows its features wants their like; within five standard errors of its own others may be.
+constexpr float kOwnErrors = 25;
 // Of what lies beyond the four pixels in many pixels, which no interpolation explains.
 constexpr float kBeyondWidth2 = 0.03f * 0.03f;
 constexpr int kComparedRows = 112;  // those filled at a time, and windows around
@@ -101,7 +101,7 @@ float Likeness::featureWeight(int x, int y, std::size_t k, int column, int row) 
         const float ratio = scale[i] / layout_.scale[i];
         const float d = mine[i * w] - rescaled(theirs[i * w], ratio);
         const float u1 = mine[error * w], u2 = ratio * ratio * theirs[error * w];
-        distance += (d * d - u1 - u2) / (kFeatureWidth2 + kOwnErrors * u1 + kTheirErrors * u2);
+        distance += (d * d - u1 - u2) / (kFeatureWidth2 + kOwnErrors * u1);
     }
     return std::exp(-std::max(0.f, distance));
 }

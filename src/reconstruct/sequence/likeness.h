@@ -39,7 +39,7 @@ float rescaled(float value, float ratio);
 ///  - d has the same of features, which show what colours are too noisy for: the means over 7 x 7 and 21 x 21
 ///    pixels of (|df|^2 - u) / (0.03^2 + u), df what a feature is beyond the range of the four pixels there
 ///    (so that no interpolation explains it), u the error variances of both; at most 9.
-///  - f of the features of the pixel there, sum of (df^2 - (u1 + u2)) / (0.2^2 + 16 u1 + 2 u2), at least 0,
+///  - f of the features of the pixel there, sum of (df^2 - (u1 + u2)) / (0.2^2 + 25 u1), at least 0,
 ///  u1
 ///    the own pixel's error variances: one that knows its features (a thin bar before a window) wants their
 ///    like, one at an edge takes what it may be.
