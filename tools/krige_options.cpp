@@ -179,7 +179,8 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
            "--temporal", o.krige.temporal,
            "krige: with --frames: data of N frames before and N after add to each frame (near the ends "
            "of a shot more on the other side), as far as there are such files, within --frames or "
-           "not. They are moved by the dumps' motion vectors, or used as they lie where there are "
+           "not; N is at most 8. They are moved by the dumps' motion vectors, or used as they lie where "
+           "there are "
            "none. What was hidden or has changed loses its weight. Memory: 2 N + 1 whole frames. "
            "Pixels do not depend on how frames are shared out to processes")
         ->check(CLI::Range(0, kMostTemporal))

@@ -116,10 +116,7 @@ pixels, R, G, B and frames:
 its frames, about the mean, by Student's t of its logarithm: what other parts of
 such a picture, with other noise, would say. They are the same in every run.
 
-Pixels that are not finite are left out.
-
-Exit codes: 0 done; 1 a frame is missing, or cannot be read or compared; 2 bad
-usage.
+Pixels that are not finite are left out. A frame that one of them lacks is an error.
 
 Examples:
   vlx-compare sequence ref_####.exr mean_####.exr kriged_####.exr
