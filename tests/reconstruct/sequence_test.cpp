@@ -196,6 +196,17 @@ TEST(Sequence, WhatHardlyWeighsSaysNothing) {
         ASSERT_TRUE(std::isfinite(value));
 }
 
+// Dark bars of a pixel before a bright window, half a pixel farther in every frame: between the pixels of
+// another frame lies a mixture that this one has nowhere.
+TEST(Sequence, ThinBarsBeforeAWindowStayDark) {
+    MadeUpShot shot;
+    shot.albedo = [](int frame, int x, int) { return (2 * x - frame + 1000) % 14 < 2 ? 0.1 : 1.0; };
+    shot.truth = [&](int frame, int x, int y) { return shot.albedo(frame, x, y) == 1 ? 3 : 0.05; };
+    shot.motion = [](int, int, int) { return 0.5; };
+    shot.noise = 0.1;
+    EXPECT_LT(shot.ratio(4), 1.02);
+}
+
 TEST(Sequence, ACutOrAFlashCostsNothing) {
     MadeUpShot shot;
     shot.truth = [](int frame, int x, int y) {
