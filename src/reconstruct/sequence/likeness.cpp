@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "reconstruct/drift/centre.h"
 #include "variolux/base/parallel.h"
@@ -12,12 +13,10 @@ namespace {
 
 /// Of one neighbour: where a pixel's point is there, and how unlike it is.
 struct ApartPlanes {
-    static constexpr int kColumn = 0, kRow = 1;  // kNowhere: not in the picture
-    static constexpr int difference(int half) {
-        return 2 + half;
-    }                                                           // of the halves' means, in standard errors
-    static constexpr int known(int half) { return 4 + half; }   // 1 where there is one
-    static constexpr int around(int half) { return 6 + half; }  // squares of means of differences
+    static constexpr int kColumn = 0, kRow = 1;                     // kNowhere: not in the picture
+    static constexpr int difference(int half) { return 2 + half; }  // e: of the halves' means
+    static constexpr int known(int half) { return 4 + half; }       // 1 where there is one
+    static constexpr int around(int half) { return 6 + half; }      // s^2 - 1 / 25
     static constexpr int aroundKnown(int half) { return 8 + half; }
     static constexpr int kBeyond = 10, kBeyondKnown = 11;  // squares that features differ by
     static constexpr int kUnlike = 12;                     // by motion
@@ -25,7 +24,6 @@ struct ApartPlanes {
 };
 
 constexpr float kNowhere = -1;
-constexpr float kFar = 1e30f;
 constexpr float kWild = 3;     // standard deviations: beyond them is an outlier, how far says nothing
 constexpr int kMeanReach = 2;  // of means of differences: what they are off by is seen sooner in these
 constexpr float kMeanArea = (2 * kMeanReach + 1) * (2 * kMeanReach + 1);
@@ -84,7 +82,7 @@ void Likeness::fill(int end) {
     const int averaged = std::min(height_, end + kWideReach);
     const int compared = std::min(height_, averaged + kMeanReach);
     apart_.claim(comparedRows_, compared);
-    parallelFor(comparedRows_, compared, [&](std::int64_t y) { compareRow(static_cast<int>(y)); });
+    parallelFor(comparedRows_, compared, [&](std::int64_t y) { followRow(static_cast<int>(y)); });
     comparedRows_ = compared;
     parallelFor(averagedRows_, averaged, [&](std::int64_t y) { averageRow(static_cast<int>(y)); });
     averagedRows_ = averaged;
@@ -113,7 +111,8 @@ bool Likeness::place(int x, int y, std::size_t k, float* column, float* row) con
     return *column != kNowhere;
 }
 
-void Likeness::compareRow(int y) {
+/// The places of row y in all neighbours, path by path, and what compareRow() says of them.
+void Likeness::followRow(int y) {
     std::vector<float> places(2 * static_cast<std::size_t>(width_));
     for (const auto* list : {&before_, &after_}) {
         const bool next = list == &after_;
@@ -208,7 +207,7 @@ void Likeness::compareRow(int y, std::size_t k, const std::vector<float>& places
             const auto i = static_cast<std::size_t>(f);
             const float ratio = scale[i] / layout_.scale[i];
             const float mine = fa[plane(f)], error = fa[plane(features_.error(f))];
-            float least = kFar, most = -kFar, spread = error;
+            float least = std::numeric_limits<float>::max(), most = -least, spread = error;
             for (const auto& [c, r, part] : corners) {
                 const float* const of = at(other.features(), r, c);
                 const float value = rescaled(of[plane(f)], ratio);

@@ -30,18 +30,16 @@ float rescaled(float value, float ratio);
 /// Of each neighbour and pixel: the place there, by the motion of one frame after the other, and the weight
 /// of each of the four pixels around it,
 ///     w = exp(-20 d - f - m),    0 where that is below 0.01.
-///  - d of the *other* half, so that weights are independent of what they weigh: how far its means are apart
-///  in
-///    units of noise. With e = sum of dz / sum of sqrt(v1 + v2) over the colours, v error variances, at most
-///    3 either way (a change of light is in many pixels, a firefly in one), and s the mean of e over 5 x 5
-///    pixels, which shows a bias that is in all of them long before squares of single pixels do: the mean of
-///    s^2 - 1 / 25 over 7 x 7 pixels, and over 21 x 21, each less its standard error.
+///  - d of the *other* half, so that weights are independent of what they weigh: how far its means are apart.
+///    e = sum of dz / sum of sqrt(v (1 / n1 + 1 / n2)) over the colours, v the smaller of the two frames'
+///    variances of a sample; at most 3 either way (a change of light is in many pixels, a firefly in one).
+///    s, the mean of e over 5 x 5 pixels, shows a bias that is in all of them long before squares of single
+///    pixels do: the mean of s^2 - 1 / 25 over 7 x 7 pixels, and over 21 x 21, each less its standard error.
 ///  - d has the same of features, which show what colours are too noisy for: the means over 7 x 7 and 21 x 21
 ///    pixels of (|df|^2 - u) / (0.03^2 + u), df what a feature is beyond the range of the four pixels there
-///    (so that no interpolation explains it), u the error variances of both; at most 9.
-///  - f of the features of the pixel there, sum of (df^2 - (u1 + u2)) / (0.2^2 + 25 u1), at least 0,
-///  u1
-///    the own pixel's error variances: one that knows its features (a thin bar before a window) wants their
+///    (no interpolation explains that), u the error variances of both; at most 9.
+///  - f of the features of the pixel there, sum of (df^2 - (u1 + u2)) / (0.2^2 + 25 u1), at least 0, with the
+///    own pixel's error variances u1: one that knows its features (a thin bar before a window) wants their
 ///    like, one at an edge takes what it may be.
 ///  - m = |motion there and back|^2, in pixels: what was hidden goes elsewhere.
 class Likeness {
@@ -70,7 +68,7 @@ class Likeness {
     struct WindowSums {
         std::vector<float> sum, count;
     };
-    void compareRow(int y);
+    void followRow(int y);
     void compareRow(int y, std::size_t k, const std::vector<float>& places);
     void averageRow(int y);
     WindowSums sumsAround(int y, int plane, int known, int reach) const;
