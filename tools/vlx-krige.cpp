@@ -15,7 +15,7 @@
 #include "import/bcd.h"
 #include "import/image_layers.h"
 #include "import_options.h"
-#include "krige_options.h"
+#include "krige/krige_options.h"
 #include "progress_bar.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"

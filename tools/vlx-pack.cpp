@@ -10,7 +10,7 @@
 #include "finished.h"
 #include "import/import.h"
 #include "import/points.h"
-#include "pack_commands.h"
+#include "pack/pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
 

@@ -16,9 +16,9 @@
 #include "render/plan/plan.h"
 #include "render/scene/scene_loader.h"
 #include "tool_main.h"
-#include "trace_options.h"
-#include "trace_report.h"
-#include "trace_view.h"
+#include "trace/trace_options.h"
+#include "trace/trace_report.h"
+#include "trace/trace_view.h"
 #include "variolux/base/parallel.h"
 
 namespace {

@@ -1,4 +1,4 @@
-#include "krige_options.h"
+#include "krige/krige_options.h"
 
 #include <cstdio>
 #include <map>

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "trace_options.h"
+#include "trace/trace_options.h"
 
 /// What vlx-trace prints.
 namespace vlx::render {

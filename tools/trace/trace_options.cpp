@@ -1,4 +1,4 @@
-#include "trace_options.h"
+#include "trace/trace_options.h"
 
 #include <cmath>
 

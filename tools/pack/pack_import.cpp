@@ -11,7 +11,7 @@
 #include "import/sbmc.h"
 #include "import/stack.h"
 #include "import_options.h"
-#include "pack_commands.h"
+#include "pack/pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
 

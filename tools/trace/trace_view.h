@@ -1,6 +1,6 @@
 #pragma once
 
-#include "trace_options.h"
+#include "trace/trace_options.h"
 
 namespace vlx::render {
 

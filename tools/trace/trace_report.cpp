@@ -1,4 +1,4 @@
-#include "trace_report.h"
+#include "trace/trace_report.h"
 
 #include <cmath>
 #include <cstdio>

@@ -1,9 +1,9 @@
-#include "trace_view.h"
+#include "trace/trace_view.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "trace_report.h"
+#include "trace/trace_report.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {
