@@ -223,7 +223,7 @@ TEST_F(DriftKriging, PartsOfTheLightAddUp) {
     Picture picture;
     SampleBand band = picture.samples();
     std::mt19937 random(9);
-    std::uniform_real_distribution<float> share(0, 1);
+    std::uniform_real_distribution<float> share(-1.5f, 1.5f);  // noise makes parts of little light negative
     band.channels.insert(band.channels.end(), {"key.R", "fill.R"});
     band.values.resize(band.channels.size());
     for (const float r : band.values[0]) {
@@ -240,7 +240,7 @@ TEST_F(DriftKriging, PartsOfTheLightAddUp) {
         for (int row = 0; row < image.data.height; ++row)
             for (int col = 0; col < image.data.width; ++col) {
                 const float* pixel = image.at(col, row);
-                ASSERT_NEAR(pixel[key] + pixel[fill], pixel[0], 4e-6) << col << " " << row;
+                ASSERT_NEAR(pixel[key] + pixel[fill], pixel[0], 8e-6) << col << " " << row;
             }
     }
 }

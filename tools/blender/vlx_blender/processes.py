@@ -23,7 +23,8 @@ class Children:
             if self.closed:
                 raise Failure("ended")
             try:
-                child = subprocess.Popen(command, start_new_session=True, **options)
+                # Signals stay as Python has them: at a file size limit a message, as on a full disk, no signal.
+                child = subprocess.Popen(command, start_new_session=True, restore_signals=False, **options)
             except OSError as error:
                 raise Failure(f"{command[0]}: cannot be started: {error.strerror}") from None
             self.running.add(child)
