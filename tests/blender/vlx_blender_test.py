@@ -31,9 +31,9 @@ def contents(path):
         return file.read()
 
 
-def blender(script, *arguments):
-    done = subprocess.run(["blender", "-b", "--factory-startup", "--python-exit-code", "1", "--python", script, "--", *arguments],
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+def blender(script, *arguments, scene=None, env=None):
+    done = subprocess.run(["blender", "-b", "--factory-startup", *([scene] if scene else []), "--python-exit-code", "1", "--python", script,
+                           "--", *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=env)
     assert done.returncode == 0, done.stdout
     return done.stdout
 
@@ -219,6 +219,30 @@ class Ends(Case):
         said = self.run_it("plain.blend", "a.exr", "--blender", self.path("blender"), code=1)
         self.assertIn("Blender was ended by signal 9\n  Blender: Error: no such device", said)
         self.assertEqual(self.left(), ["blender"])
+
+
+class AddOn(Case):
+    def test_pictures_and_sequences_are_opened(self):
+        home = {**os.environ, "BLENDER_USER_CONFIG": self.path("config"), "BLENDER_USER_SCRIPTS": self.path("scripts")}
+        os.mkdir(self.path("scripts"))
+        archive = os.path.join(BIN, "..", "tools", "blender", "variolux-blender.zip")
+        scene = shutil.copy(os.path.join(SCENES, "plain.blend"), self.path("scene.blend"))
+        printed = blender(os.path.join(HERE, "addon_steps.py"), archive, os.path.join(BIN, "vlx-blender"), self.folder, scene=scene, env=home)
+        found = json.loads(printed.split("found ")[1].splitlines()[0])
+        self.assertEqual(found["still"], ["FINISHED"])
+        self.assertIn("stddev", found["still node"]["outputs"])
+        self.assertIn("Combined_fill", found["still node"]["outputs"])
+        self.assertEqual(found["still node"]["source"], "FILE")
+        self.assertEqual(found["shot"], ["FINISHED"])
+        shot = found["shot node"]
+        self.assertEqual((shot["file"], shot["source"], shot["type"], shot["frames"]), ("shot_02.exr", "SEQUENCE", "MULTILAYER", [2, 1, 2]))
+        for frame in (2, 3):
+            comped = exr.read(self.path(f"comped_{frame:04}.exr"))[0]
+            self.assertEqual(comped["R"], exr.read(self.path(f"shot_{frame:02}.exr"))[0][LAYER + "Combined.R"])
+        self.assertIn("expected a camera in the scene 'Scene', found none", found["no camera"])
+        self.assertIn("no-such-program: No such file or directory: set the path of vlx-blender", found["no program"])
+        self.assertTrue(found["off"])
+        self.assertEqual(contents(scene), contents(os.path.join(SCENES, "plain.blend")))  # never saved
 
 
 class BadInput(Case):

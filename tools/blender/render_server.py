@@ -48,6 +48,7 @@ def chosen_layer(scene):
 
 
 def description(scene, layer):
+    editor = scene.sequence_editor
     return {
         "file": bpy.data.filepath,
         "scene": scene.name,
@@ -58,7 +59,7 @@ def description(scene, layer):
         "engine": scene.render.engine,
         "cycles": hasattr(scene, "cycles"),
         "camera": bool(scene.camera or any(marker.camera for marker in scene.timeline_markers)),
-        "strips": bool(scene.sequence_editor and scene.sequence_editor.sequences_all),
+        "strips": bool(editor and (editor.strips_all if hasattr(editor, "strips_all") else editor.sequences_all)),  # since 4.4
         "frames": [scene.frame_start, scene.frame_end, scene.frame_step],
         "frame": scene.frame_current,
         "layer": layer.name if layer else None,
@@ -100,8 +101,9 @@ def prepare(scene, layer):
         if name.startswith("use_stamp"):  # files would carry paths and dates
             setattr(render, name, False)
     render.use_stamp_note = True
+    setting(image, "media_type", "MULTI_LAYER_IMAGE")  # since 5.0
     image.file_format = "OPEN_EXR_MULTILAYER"
-    image.color_depth = "32"
+    image.color_depth = "32"  # in half floats light groups would not add up to the beauty
     image.exr_codec = "ZIP"
     render.use_file_extension = False
     render.use_overwrite = True
