@@ -54,6 +54,13 @@ scene.frame_start, scene.frame_end, scene.frame_step, scene.frame_current = 2, 6
 cycles.samples, cycles.use_adaptive_sampling, cycles.use_denoising = 7, False, False
 save("plain.blend", compress=False)
 
+passes = ["z", *(f"{kind}_{part}" for kind in ("diffuse", "glossy") for part in ("direct", "indirect", "color"))]
+for name in passes:
+    setattr(layer, "use_pass_" + name, True)
+save("passes.blend")
+for name in passes:
+    setattr(layer, "use_pass_" + name, False)
+
 # All that is to be off while rendering, on. The picture is that of the plain file.
 cycles.use_adaptive_sampling = cycles.use_denoising = True
 cycles.time_limit, cycles.sample_offset = 0.001, 5

@@ -84,6 +84,52 @@ class Pictures(Case):
         self.assertIn("stddev", outputs)
         self.assertIn("Combined_key", outputs)
 
+    def test_contributions_add_up_and_depths_are_there(self):
+        self.run_it("passes.blend", "a.exr", *QUICK)
+        channels, _ = exr.read(self.path("a.exr"))
+        for c in "RGB":
+            beauty = channels[LAYER + "Combined." + c]
+            parts = zip(channels[LAYER + "Diffuse." + c], channels[LAYER + "Glossy." + c])
+            self.assertLess(max(abs(a + b - whole) for (a, b), whole in zip(parts, beauty)), 1e-5 * max(beauty))
+        self.assertEqual(len(self.left()), 1)
+        middle = 16 * 40 + 20
+        self.assertAlmostEqual(channels[LAYER + "Depth.Z"][middle], channels[LAYER + "Denoising Depth.Z"][middle], delta=0.5)
+        self.assertGreater(channels[LAYER + "Depth.Z"][middle], 5)
+
+    def test_more_images_until_the_error_is_met(self):
+        # vlx-krige with a predicted error that is known: 0.04 of two images, falling as theory has it.
+        os.mkdir(self.path("bin"))
+        for name in ("vlx-blender", "vlx-pack"):
+            os.symlink(os.path.realpath(os.path.join(BIN, name)), self.path("bin/" + name))
+        program = self.path("bin/vlx-krige")
+        with open(program, "w") as file:
+            file.write(f"""#!{sys.executable}
+import json, subprocess, sys
+done = subprocess.run([{os.path.join(BIN, "vlx-krige")!r}, *sys.argv[1:]], stdout=subprocess.PIPE, text=True)
+if "--json" in sys.argv and done.stdout:
+    report = json.loads(done.stdout)
+    report["predictedRelMSE"] = 0.04 * (2 / (report["samples"] / 1280)) ** 0.6
+    done.stdout = json.dumps(report)
+print(done.stdout, end="")
+sys.exit(done.returncode)
+""")
+        os.chmod(program, 0o755)
+
+        def run_it(code, *options):
+            command = [self.path("bin/vlx-blender"), *self.command("plain.blend", *options)[1:], "--spp", "1"]
+            done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+            self.assertEqual(done.returncode, code, done.stderr)
+            return done.stderr
+        said = run_it(0, "a.exr", "--images", "2", "--target-error", "relmse=0.02")
+        self.assertIn("relMSE 0.04 with 2 samples a pixel: goes on to 6", said)
+        self.assertIn("relMSE 0.0207 with 6 samples a pixel: goes on to 7", said)
+        self.assertIn("7 samples a pixel, predicted relMSE 0.0189", said)
+        run_it(0, "b.exr", "--images", "7")
+        self.assertEqual(exr.read(self.path("a.exr"))[0], exr.read(self.path("b.exr"))[0])
+        said = run_it(3, "c.exr", "--images", "2", "--target-error", "relmse=0.02", "--max-images", "3", "-q")
+        self.assertIn("WARNING: frame 3: relMSE 0.0314 with 3 samples a pixel, wanted 0.02 (--max-images)", said)
+        self.assertEqual(self.left(), ["a.exr", "b.exr", "bin", "c.exr"])
+
     def test_switches_of_the_scene_do_not_reach_the_picture(self):
         self.run_it("plain.blend", "plain.exr", *QUICK)
         said = self.run_it("switches.blend", "switches.exr", *QUICK)

@@ -47,6 +47,12 @@ def chosen_layer(scene):
     return next((layer for layer in scene.view_layers if (layer.name == wanted if wanted else layer.use)), None)
 
 
+def first_sample(layer):
+    """Sample 0 is the pixel's centre with every seed, which says nothing of edges; but depth, position and indices are those of
+    sample 0 alone."""
+    return 0 if any((layer.use_pass_z, layer.use_pass_position, layer.use_pass_object_index, layer.use_pass_material_index)) else 1
+
+
 def description(scene, layer):
     editor = scene.sequence_editor
     return {
@@ -64,7 +70,7 @@ def description(scene, layer):
         "frame": scene.frame_current,
         "layer": layer.name if layer else None,
         "layers": [each.name for each in scene.view_layers],
-        "lightGroups": [group.name for group in layer.lightgroups] if layer else [],
+        "firstSample": first_sample(layer) if layer else 1,
         "motionBlur": scene.render.use_motion_blur,
         "stereo": scene.render.use_multiview,
         "missing": missing_files(),

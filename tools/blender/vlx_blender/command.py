@@ -21,8 +21,9 @@ WITHOUT = {"--band", "--scale", "--max-memory", "--assess"}  # and those that go
 
 DESCRIPTION = """Renders a Blender file with Cycles, takes out the noise by kriging, and says how accurate each picture is.
 One Blender in the background renders every frame as a few images of a few samples; each frame is packed and kriged while the next one
-renders. The pictures are OpenEXR files with all layers of Blender's own, light groups denoised together with the beauty, and stddev
-added, the standard deviation of the error of R, G, B. The file is never saved."""
+renders. The pictures are OpenEXR files with the layers of Blender's own: light groups and contributions (Diffuse, Glossy, ...) denoised
+together with the beauty, which they add up to; other passes averaged; stddev added, the standard deviation of the error of R, G, B. The
+file is never saved."""
 
 FOOTER = """Examples:
   vlx-blender room.blend -o room.exr
@@ -197,9 +198,8 @@ def render(o, krige, programs, log, children, temporary):
     about = blender.about
     check_about(about, o, log)
     chosen = chosen_frames(o, about)
-    groups = [f"{about['layer']}.Combined_{group}" for group in about["lightGroups"]]
     options = Options(o.output, o.images, o.spp, o.temporal, o.target_error or 0.0, o.max_images, o.keep_samples or "",
-                      [*krige, *(["--threads", str(o.threads)] if o.threads else [])], groups)
+                      [*krige, *(["--threads", str(o.threads)] if o.threads else [])], about["firstSample"])
     notes = notes_of(o, krige, about, chosen, programs)
 
     def is_finished(frame):

@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import os
+import shlex
 import shutil
 import threading
 
@@ -13,6 +14,7 @@ from .log import Failure
 
 AHEAD = 2            # frames that may wait for kriging, so that the disk does not fill with them
 ERROR_FALLS = 0.6    # as samples ** -0.6, measured over scenes
+OPINIONS = ("--denoiser", "--denoised")  # options of vlx-krige that go without --radiance
 MOST_AT_ONCE = 3     # times as many images as there are, in one step towards the wanted error
 
 
@@ -26,7 +28,7 @@ class Options:
     most_images: int
     keep: str               # a folder for dumps, or empty
     krige: list             # options of vlx-krige
-    light_groups: list      # layers of light groups, as Blender's file names them
+    first_sample: int       # number of the first image's first sample
 
 
 class Frame:
@@ -55,6 +57,7 @@ class Shot:
         self.failure = None
         self.busy = self.closing = False
         self.said = set()
+        self.radiance = []  # vlx-krige's options for light groups and contributions, as vlx-pack finds them
         self.missed = []  # frames whose error stayed above the wanted one
         self.images_done = 0
         self.task, self.part = "rendering", 0.0
@@ -62,8 +65,7 @@ class Shot:
     # What is where. #### stands for the frame in what vlx-krige reads.
 
     def image(self, frame, i):
-        """The first one is also the file whose layers the picture keeps."""
-        return os.path.join(self.temporary, f"image_{frame:04}_{i:04}.exr" if i else f"image_{frame:04}.exr")
+        return os.path.join(self.temporary, f"image_{frame:04}_{i:04}.exr")
 
     def dumps(self):
         return os.path.join(self.temporary, "samples_####.exr")
@@ -72,7 +74,8 @@ class Shot:
         return os.path.join(self.temporary, "kriged_####.exr")
 
     def templates(self):
-        return os.path.join(self.temporary, "image_####.exr")
+        """All that is not light: the mean of the images' other passes."""
+        return os.path.join(self.temporary, "passes_####.exr")
 
     # Progress: an image and a frame's kriging count the same.
 
@@ -119,7 +122,8 @@ class Shot:
                 self.task = f"frame {frame.number}, image {i + 1} of {frame.asked}"
                 self.part = 0.0
                 self.told()
-            self.blender.render(frame.number, 1 + i * self.options.samples, self.image(frame.number, i), self.notes.get(frame.number, ""))
+            self.blender.render(frame.number, self.options.first_sample + i * self.options.samples, self.image(frame.number, i),
+                                self.notes[frame.number])
             with self.changed:
                 if self.failure:
                     raise self.failure
@@ -156,11 +160,14 @@ class Shot:
 
     def pack(self, frame):
         images = [self.image(frame.number, i) for i in range(frame.images)]
-        dump = frames.name_of(self.dumps(), frame.number)
-        layers = [argument for layer in self.options.light_groups for argument in ("--radiance", layer)]
-        self.ran("vlx-pack", "stack", *images, "-o", dump, "--overwrite", "--preset", "cycles", *layers)
+        dump, passes = (frames.name_of(name, frame.number) for name in (self.dumps(), self.templates()))
+        report = self.ran("vlx-pack", "stack", *images, "-o", dump, "--overwrite", "--preset", "cycles", "--groups", "auto",
+                          "--passes", passes)
+        for line in report.splitlines():
+            if line.strip().startswith("For vlx-krige:"):
+                self.radiance = shlex.split(line.split(":", 1)[1])
         if not self.options.target:
-            self.remove(images[1:])
+            self.remove(images)
         frame.packed = True
 
     def ready(self):
@@ -168,7 +175,12 @@ class Shot:
         return [f for f, window in self.windows.items() if not self.frames[f].kriged and all(self.frames[i].packed for i in window)]
 
     def krige_arguments(self, numbers):
-        options = [argument for layer in self.options.light_groups for argument in ("--radiance", layer)]
+        options = [*self.radiance]
+        if any(word.split("=")[0] in OPINIONS for word in self.options.krige):
+            options = []
+            if self.radiance:
+                self.warn("WARNING: with another denoiser's image light groups and contributions are the samples' mean, as noisy as "
+                          "that: they would not add up to the picture")
         if self.options.temporal:
             options += ["--temporal", str(self.options.temporal)]
         return [self.dumps(), "-o", self.pictures(), "--template", self.templates(), "--frames", ",".join(map(str, numbers)),
@@ -215,7 +227,7 @@ class Shot:
         number = frame.number
         output = frames.name_of(self.options.output, number)
         os.replace(frames.name_of(self.pictures(), number), output)
-        self.remove(self.image(number, i) for i in range(frame.images))
+        self.remove([frames.name_of(self.templates(), number), *(self.image(number, i) for i in range(frame.images))])
         frame.kriged = True
         samples = frame.images * self.options.samples
         said = "" if error is None else f", predicted relMSE {error:.3g}"
@@ -235,7 +247,7 @@ class Shot:
                 kept = frames.name_of(kept_name(self.options), frame.number)
                 shutil.move(dump, kept + ".part")
                 os.replace(kept + ".part", kept)
-            self.remove([dump, self.image(frame.number, 0)])
+            self.remove([dump, frames.name_of(self.templates(), frame.number)])
 
     @staticmethod
     def remove(files):
@@ -243,15 +255,18 @@ class Shot:
             if os.path.exists(file):
                 os.remove(file)
 
+    def warn(self, message):
+        """Once, and only what is wrong where --quiet was given."""
+        if message not in self.said:
+            self.said.add(message)
+            (self.log.warn if "WARNING" in message else self.log.say)(message)
+
     def ran(self, program, *arguments):
         """Standard output of a program that did its work; what it says is passed on, once."""
         code, out, messages, failure = self.programs.run(program, *arguments, "--log", "json")
         warnings = [line.strip() for line in out.splitlines() if "WARNING" in line]
         for message in [*messages, *warnings]:
-            message = message.replace(self.temporary + os.sep, "")
-            if message not in self.said:
-                self.said.add(message)
-                self.log.say(message)
+            self.warn(message.replace(self.temporary + os.sep, ""))
         if code != 0:
             raise Failure(failure.replace(self.temporary + os.sep, "") or f"{program} ended with exit code {code}")
         return out
