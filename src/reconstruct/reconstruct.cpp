@@ -5,6 +5,7 @@
 
 #include "reconstruct/common/bands.h"
 #include "reconstruct/common/methods.h"
+#include "reconstruct/common/relative_error.h"
 #include "reconstruct/opinion/opinion.h"
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
@@ -69,10 +70,10 @@ Image outline(const SampleSource& source, const Method& method) {
 
 ReconstructionReport reconstruct(const SampleSource& source, const Method& method, const RowSink& sink,
                                  const Progress& progress) {
-    static_cast<void>(outline(source, method));  // throws when options are invalid
+    const Image image = outline(source, method);  // throws when options are invalid
     struct Run {
         const SampleSource& source;
-        const RowSink& sink;
+        const RowSink sink;
         const Progress& progress;
         auto operator()(const Drift& m) const {
             return m.secondOpinion ? reconstructWithOpinion(source, m, sink, progress)
@@ -82,7 +83,10 @@ ReconstructionReport reconstruct(const SampleSource& source, const Method& metho
         auto operator()(const Mean& m) const { return reconstructMean(source, m, sink, progress); }
         auto operator()(const Gaussian& m) const { return reconstructGaussian(source, m, sink, progress); }
     };
-    return std::visit(Run{source, sink, progress}, method);
+    MeasuredRows measured(image, sink);
+    ReconstructionReport report = std::visit(Run{source, measured.sink(), progress}, method);
+    report.predictedRelMse = measured.relMse();
+    return report;
 }
 
 Reconstruction reconstruct(const SampleSource& source, const Method& method, const Progress& progress) {

@@ -74,8 +74,11 @@
 ///    frame's own data weigh 1. Kriging then sees more samples in a pixel, sum w n.
 ///
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
-/// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights
-/// too, so that dividing by it leaves no halos; it is kept within 0 to 1.
+/// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights as
+/// far as its noise explains what the mean of the pixel's samples says otherwise (drift/finishing.h): edges
+/// of coverage are the samples' own, smoke and what is out of focus are smooth. Where samples agree on 0 or 1
+/// it stays so, but where coverage changes slowly and their neighbours say that it was chance. It is kept
+/// within 0 to 1.
 namespace vlx {
 
 /// Frames on either side that add to one of a Sequence, at most.
@@ -90,7 +93,7 @@ enum class Quality {
 
 /// What happens to samples that are brighter than all else around (fireflies).
 enum class Fireflies {
-    Keep,    ///< nothing: unbiased, and noisy
+    Keep,    ///< nothing: as noisy as the samples, and no light is lost to this step
     Robust,  ///< the brightest sample of the 5 x 5 pixels of the dump around it, if there are 9 or more,
              ///< counts as bright as the second brightest (a Winsorised mean: of 25 n samples one, so the
              ///< bias vanishes as n grows); where many lose light it is given back to their surroundings

@@ -92,7 +92,12 @@ struct DriftReport {
                                       ///< estimate, whether fireflies lost it or not
     double light = 1;                 ///< luminance of the image over that of all samples, as they came:
                        ///< sums over samples (a pixel counts as often as it was sampled); 0: there is none
-    double lightError = 0;                   ///< standard error of the samples', as a share of it
+    double lightError = 0;  ///< standard error of the samples', as a share of it
+    /// Correlation of the noise of pixels beside each other in a row, from the differences of their halves,
+    /// and its standard error: 0 is what all error variances take it for. A pixel filter that gives a sample
+    /// to several pixels makes it 0.1 to 0.8. With frames of a sequence, whose data lie between pixels, it
+    /// says nothing of the renderer.
+    double neighbourCorrelation = 0, neighbourCorrelationError = 0;
     std::int64_t neighbourhoods = 0;         ///< kriged, over models and halves
     std::int64_t ownNeighbourhoods = 0;      ///< centred on pixels unlike their regular centres
     std::int64_t failedNeighbourhoods = 0;   ///< not solvable: their weighted mean
@@ -111,8 +116,11 @@ struct ReconstructionReport {
     std::int64_t samples = 0;         ///< samples read
     std::int64_t droppedSamples = 0;  ///< non-finite radiance: left out
     std::int64_t emptyPixels = 0;     ///< pixels without a usable sample of their own
-    double readSeconds = 0;           ///< wall time in the reader
-    double solveSeconds = 0;          ///< wall time of everything else
+    /// Mean over pixels and colours of stddev^2 / (value^2 + 0.01): the relMSE that the error map predicts.
+    /// Nothing where there is no error map.
+    std::optional<double> predictedRelMse;
+    double readSeconds = 0;                                         ///< wall time in the reader
+    double solveSeconds = 0;                                        ///< wall time of everything else
     std::variant<std::monostate, PaperReport, DriftReport> method;  ///< of those that have more to say
 
     const PaperReport& paper() const { return std::get<PaperReport>(method); }

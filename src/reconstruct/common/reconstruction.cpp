@@ -33,6 +33,7 @@ nlohmann::ordered_json json(const DriftReport& report) {
         {"energyReturned", report.energyReturned},
         {"light", report.light},
         {"lightError", report.lightError},
+        {"neighbourCorrelation", report.neighbourCorrelation},
         {"farPixels", report.farPixels},
         {"exactPixels", report.exactPixels},
         {"neighbourhoods", report.neighbourhoods},
@@ -64,6 +65,7 @@ nlohmann::ordered_json json(const ReconstructionReport& report) {
                                        {"emptyPixels", report.emptyPixels},
                                        {"readSeconds", report.readSeconds},
                                        {"solveSeconds", report.solveSeconds}};
+    if (report.predictedRelMse) document["predictedRelMse"] = *report.predictedRelMse;
     document.update(std::visit([](const auto& of) { return json(of); }, report.method));
     return document;
 }
@@ -183,6 +185,16 @@ std::string lightInWords(const DriftReport& report) {
     return text.str();
 }
 
+std::string neighboursInWords(const DriftReport& report) {
+    constexpr double kMuch = 0.1, kStandardErrors = 5;
+    const double found = report.neighbourCorrelation;
+    if (report.sequence || found < kMuch || found < kStandardErrors * report.neighbourCorrelationError)
+        return {};
+    return "WARNING: pixels beside each other share their noise (correlation " + formatted("%.2f", found) +
+           "): a pixel filter gave samples to several of them, which kriging takes for structure and the "
+           "error map does not know; render with a box filter of one pixel\n";
+}
+
 std::string inWords(const SequenceReport& of) {
     std::ostringstream text;
     if (of.frames == 0)
@@ -215,6 +227,7 @@ std::string inWords(const DriftReport& report) {
          << std::round(100 * perNeighbourhood(report, report.driftFunctions)) / 100
          << " drift functions on average, "
          << perNeighbourhood(report, static_cast<double>(report.driftFeatures)) << " features varying\n";
+    text << neighboursInWords(report);
     if (report.sequence) text << inWords(*report.sequence);
     if (const auto& of = report.secondOpinion)
         text << "the kriging weighs " << 100 * of->weight << " %, the other image the rest ("
@@ -270,7 +283,10 @@ std::string toText(const ReconstructionReport& report) {
         text << " (" << drift->farPixels << " of them more than 5 pixels from any)";
     if (drift && drift->exactPixels > 0)
         text << ", " << drift->exactPixels << " pixels kept: their stated error is 0";
-    text << "\n" << std::visit([](const auto& of) { return inWords(of); }, report.method);
+    text << "\n";
+    if (report.predictedRelMse)
+        text << "predicted error, relMSE: " << formatted("%.3g", *report.predictedRelMse) << "\n";
+    text << std::visit([](const auto& of) { return inWords(of); }, report.method);
     return text.str();
 }
 

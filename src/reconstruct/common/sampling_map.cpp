@@ -3,29 +3,19 @@
 #include <cassert>
 #include <cmath>
 
+#include "reconstruct/common/relative_error.h"
+
 namespace vlx {
 
 Image samplingMap(const Image& estimate) {
-    constexpr double kEpsilon = 0.01;  // of relMSE
-    int value[3], stddev[3];
-    const char* const names[] = {"R", "G", "B"};
-    for (int c = 0; c < 3; ++c) {
-        value[c] = estimate.channel(names[c]);
-        stddev[c] = estimate.channel(std::string("stddev.") + names[c]);
-        assert(value[c] >= 0 && stddev[c] >= 0);
-    }
+    const RelativeError error(estimate);
+    assert(error.known());
     Image map(estimate.data, {"sampling.density"});
     map.display = estimate.display;
     double sum = 0;
     for (int row = 0; row < map.data.height; ++row)
         for (int col = 0; col < map.data.width; ++col) {
-            const float* pixel = estimate.at(col, row);
-            double squares = 0;
-            for (int c = 0; c < 3; ++c) {
-                const auto z = static_cast<double>(pixel[value[c]]),
-                           s = static_cast<double>(pixel[stddev[c]]);
-                squares += s * s / (z * z + kEpsilon) / 3;
-            }
+            const double squares = error.of(estimate.at(col, row));
             sum += std::sqrt(squares);
             *map.at(col, row) = static_cast<float>(std::sqrt(squares));
         }

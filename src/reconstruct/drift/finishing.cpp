@@ -127,7 +127,8 @@ void Finishing::cleanRow(int y) {
 void Finishing::errorRow(int y) {
     Light::Row row(width_);
     const auto w = static_cast<std::size_t>(width_);
-    const std::vector<float> sums = sharedVariances(y);
+    const std::vector<float> sums = alikeSums(y);
+    coverageRow(y, sums.data() + 4 * w);
     std::vector<float> unexplained(static_cast<std::size_t>(width_)), known(unexplained.size());
     for (int x = 0; x < width_; ++x) {
         const double n = data_.row(planes_.count(), y)[x];
@@ -194,6 +195,7 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
     const Light::Shares shares = light_.shares(y);
     const std::vector<double> common = common_.shares(y);
     Counts counts;
+    counts.neighbours = neighboursInRow(y);
     for (int x = 0; x < width_; ++x, out += radiance_ + 3) {
         const auto i = static_cast<std::size_t>(x);
         const double n = data_.row(planes_.count(), y)[x];
@@ -249,6 +251,42 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
     return counts;
 }
 
+void NoiseCorrelation::add(const NoiseCorrelation& other) {
+    products += other.products;
+    squares += other.squares;
+    chance += other.chance;
+}
+
+double NoiseCorrelation::standardError() const { return squares > 0 ? std::sqrt(chance) / squares : 0; }
+
+/// The difference of the halves' means, summed over colours, in units of its standard deviation if colours
+/// were independent; 0 where a half has no sample or nothing differs.
+double Finishing::halvesApart(int x, int y) const {
+    constexpr double kMost = 3;
+    const double nA = data_.row(planes_.halfCount(0), y)[x], nB = data_.row(planes_.halfCount(1), y)[x];
+    if (nA == 0 || nB == 0) return 0;
+    double apart = 0, variance = 0;
+    for (int c = 0; c < 3; ++c) {
+        apart += static_cast<double>(data_.row(planes_.mean(0) + c, y)[x]) -
+                 static_cast<double>(data_.row(planes_.mean(1) + c, y)[x]);
+        variance += static_cast<double>(variances_.row(c, y)[x]) * (1 / nA + 1 / nB);
+    }
+    return variance > 0 ? std::clamp(apart / std::sqrt(variance), -kMost, kMost) : 0;
+}
+
+NoiseCorrelation Finishing::neighboursInRow(int y) const {
+    NoiseCorrelation sums;
+    double left = halvesApart(0, y);
+    for (int x = 1; x < width_; ++x) {
+        const double own = halvesApart(x, y);
+        sums.products += own * left;
+        sums.squares += (own * own + left * left) / 2;
+        sums.chance += own * own * left * left;
+        left = own;
+    }
+    return sums;
+}
+
 double Finishing::gapVariance(int c, int x, int y) const {
     const double gap = data_.row(planes_.gap(), y)[x];
     return gap > 0 ? picture_.semivarianceAt(c, gap / options_.scale) : 0;
@@ -266,15 +304,18 @@ bool Finishing::isExact(int x, int y) const {
     return true;
 }
 
-/// Variances of R, G, B of the mean of the two halves' estimates, from their differences, over the pixels of
-/// alike features around each pixel of row y: three rows, and one of weights.
-std::vector<float> Finishing::sharedVariances(int y) const {
-    std::vector<float> sums(4 * static_cast<std::size_t>(width_));
+/// Rows of sums over the pixels of alike features around each pixel of row y: of the variances of R, G, B of
+/// the mean of the two halves' estimates, from their differences; of 1; where there is alpha, of
+/// (K - M)^2 and (1 - h) v (coverageRow).
+std::vector<float> Finishing::alikeSums(int y) const {
+    const int rows = layout_.alpha >= 0 ? 6 : 4;
+    std::vector<float> sums(static_cast<std::size_t>(rows) * static_cast<std::size_t>(width_));
     sumAlike(
-        features_, layout_.features, kAlikeReach, 4,
+        features_, layout_.features, kAlikeReach, rows,
         [&](int row, int c, float* q) {
-            if (c == 3) {
-                std::fill_n(q, width_, 1.f);
+            if (c >= 3) {
+                for (int x = 0; x < width_; ++x)
+                    q[x] = c == 3 ? 1.f : static_cast<float>(coverageMoment(c == 4, x, row));
                 return;
             }
             const float* const a = combined_.row(combinedPlanes_.half(0) + c, row);
@@ -283,6 +324,52 @@ std::vector<float> Finishing::sharedVariances(int y) const {
         },
         y, width_, height_, sums.data());
     return sums;
+}
+
+/// Of a pixel's alpha, M the mean of its samples and K the kriging's: (K - M)^2 (`apart`), or
+/// (1 - h) v, where v = (M_A - M_B)^2 n_A n_B / (n_A + n_B)^2 is the variance of M as the halves show it
+/// and h what M weighs in K: the part of the former that the noise of M explains.
+double Finishing::coverageMoment(bool apart, int x, int y) const {
+    const double nA = data_.row(planes_.halfCount(0), y)[x], nB = data_.row(planes_.halfCount(1), y)[x];
+    if (nA + nB <= 0) return 0;
+    if (apart) {
+        const double step =
+            static_cast<double>(combined_.row(combinedPlanes_.value() + layout_.alpha, y)[x]) -
+            plainMean(data_, planes_, layout_.alpha, x, y);
+        return step * step;
+    }
+    if (nA == 0 || nB == 0) return 0;
+    const double differ = static_cast<double>(data_.row(planes_.mean(0) + layout_.alpha, y)[x]) -
+                          static_cast<double>(data_.row(planes_.mean(1) + layout_.alpha, y)[x]);
+    const double leverage = std::clamp<double>(combined_.row(combinedPlanes_.leverage(), y)[x], 0, 1);
+    return (1 - leverage) * differ * differ * nA * nB / ((nA + nB) * (nA + nB));
+}
+
+/// Whether the kriging's alpha changes by more than a half within `reach`.
+bool Finishing::isBorder(int x, int y, int reach) const {
+    float least = 1, most = 0;
+    for (int row = std::max(0, y - reach); row <= std::min(height_ - 1, y + reach); ++row) {
+        const float* const alpha = combined_.row(combinedPlanes_.value() + layout_.alpha, row);
+        const auto [low, high] =
+            std::minmax_element(alpha + std::max(0, x - reach), alpha + std::min(width_, x + reach + 1));
+        least = std::min(least, *low);
+        most = std::max(most, *high);
+    }
+    return most - least > 0.5f;
+}
+
+void Finishing::coverageRow(int y, const float* sums) {
+    if (layout_.alpha < 0) return;
+    float* const alpha = clean_.row(cleanPlanes_.value() + layout_.alpha, y);
+    for (int x = 0; x < width_; ++x) {
+        if (data_.row(planes_.count(), y)[x] == 0) continue;
+        const double mean = plainMean(data_, planes_, layout_.alpha, x, y), value = alpha[x];
+        double own = shrinkage(sums[x], sums[width_ + x]);
+        const bool agree = coverage(mean) == 0 || coverage(mean) == 1;
+        if (agree && (own >= 0.5 || isBorder(x, y, kReach))) own = 1;
+        if (own < 1 && isBorder(x, y, 1)) own = (3 + own) / 4;
+        alpha[x] = static_cast<float>(own < 1 ? value + own * (mean - value) : mean);
+    }
 }
 
 }  // namespace vlx

@@ -12,10 +12,24 @@
 /// From the combined estimate to the picture and its error: drift.h, 7 to 9.
 namespace vlx {
 
+/// How alike the noise of pixels beside each other is: d, the difference of a pixel's halves in units of its
+/// standard deviation, cut at 3, is noise alone; products of neighbours' are 0 on average where pixels do not
+/// share samples.
+struct NoiseCorrelation {
+    double products = 0;  ///< sum of d d'
+    double squares = 0;   ///< sum of (d^2 + d'^2) / 2
+    double chance = 0;    ///< sum of (d d')^2
+
+    void add(const NoiseCorrelation& other);
+    double value() const { return squares > 0 ? products / squares : 0; }
+    double standardError() const;
+};
+
 /// Refers to its level and rings. Rows may be worked on at the same time.
 class Finishing {
   public:
     static constexpr int kAlikeReach = 2;  ///< of the error map: 5 x 5 pixels
+    static constexpr int kReach = 4;       ///< how far alpha looks for an edge
 
     /// `combined`: CombinedPlanes, instead of the level's own; `clean`: CleanPlanes; `light`: LightPlanes;
     /// `common`: CommonErrorPlanes.
@@ -28,14 +42,23 @@ class Finishing {
     /// the variance of a sample, or the mean of it over 3 x 3 pixels. All channels move by the same weight,
     /// along the line to the neighbour nearest to the range's border. Combined rows y - 1 to y + 1 are there.
     void cleanRow(int y);
-    /// The variance of row y of `clean`, and row y of `light` and `common`. Clean row y and combined rows y -
-    /// kAlikeReach to y + kAlikeReach are there.
+    /// The variance and the alpha of row y of `clean`, and row y of `light` and `common`. Clean row y and
+    /// combined rows y - kReach to y + kReach are there.
+    ///
+    /// Alpha: K + s (M - K), M the mean of the pixel's samples, K the kriging's, s the share of what they
+    /// differ by that the noise of M does not explain, shrinkage(sum (K - M)^2, sum (1 - h) v) over the
+    /// pixels of alike features in 5 x 5: with 1 - s the weight of K of least squared error, since E[(K -
+    /// M)^2] is K's squared error + (1 - 2 h) v. Where K changes by more than a half from a pixel to the
+    /// next, few pixels tell and errors differ: a quarter of that weight keeps 7/16 of its gain, and 1/16 of
+    /// its loss where it is wrong. Samples that agree on 0 or 1 keep their word within kReach of such an
+    /// edge, and wherever s is 1/2 or more.
     void errorRow(int y);
     struct Counts {
         std::int64_t exact = 0;  ///< pixels
         double moved = 0;        ///< luminance given back, summed over samples
         double image = 0;        ///< luminance of the image, summed over samples
         double noise = 0;        ///< variance of the same sum of the samples' own luminance
+        NoiseCorrelation neighbours;
     };
     /// Row y of the picture: radiance channels and stddev of R, G, B, interleaved. Rows of LightReach::kNear
     /// around it are there.
@@ -44,7 +67,12 @@ class Finishing {
   private:
     double sampleVariance(int c, int x, int y) const;
     bool isExact(int x, int y) const;
-    std::vector<float> sharedVariances(int y) const;
+    std::vector<float> alikeSums(int y) const;
+    double coverageMoment(bool apart, int x, int y) const;
+    bool isBorder(int x, int y, int reach) const;
+    void coverageRow(int y, const float* sums);
+    double halvesApart(int x, int y) const;
+    NoiseCorrelation neighboursInRow(int y) const;
     double meanVariance(int c, int x, int y) const;
     double gapVariance(int c, int x, int y) const;
     std::optional<double> commonError(int x, int y, const double* predicted) const;

@@ -103,6 +103,8 @@ class FrameKriging::Stages {
             drift_.energyRemoved = counts.removed / counts.luminance;
             drift_.energyReturned = returned_ / counts.luminance;
         }
+        drift_.neighbourCorrelation = neighbours_.value();
+        drift_.neighbourCorrelationError = neighbours_.standardError();
         drift_.light = 0;
         if (counts.light > 0) {
             drift_.light = imageLight_ / counts.light;
@@ -128,7 +130,7 @@ class FrameKriging::Stages {
     void startAbove(int first) {
         finishedRows_ = first;
         cleanRows_ = std::max(0, first - LightReach::kNear);
-        correctedRows_ = std::max(0, cleanRows_ - Finishing::kAlikeReach);
+        correctedRows_ = std::max(0, cleanRows_ - Finishing::kReach);
         differenceRows_ = std::max(0, correctedRows_ - Correction::kReach);
         const int fine = fine_.startAbove(halved_ ? fineAbove(differenceRows_) : correctedRows_);
         frame_.startAbove(fine, halved_ ? coarse_->startAbove(differenceRows_ / 2 - 1) : 0);
@@ -165,7 +167,7 @@ class FrameKriging::Stages {
         until = std::min(until, height_);
         while (cleanRows_ < until) {  // few rows at a time: the rings hold no more
             const int end = std::min(until, cleanRows_ + kTile);
-            correct(end + Finishing::kAlikeReach);
+            correct(end + Finishing::kReach);
             for (RowRing* ring : {&clean_, &light_, &common_}) ring->claim(cleanRows_, end);
             parallelFor(cleanRows_, end, [&](std::int64_t y) {
                 finishing_.cleanRow(static_cast<int>(y));
@@ -190,6 +192,7 @@ class FrameKriging::Stages {
             returned_ += of.moved;
             imageLight_ += of.image;
             lightNoise_ += of.noise;
+            neighbours_.add(of.neighbours);
         }
         for (int y = finishedRows_; y < until && residuals_; ++y) residuals_->addRow(y, drift_);
         requireNumbers(until - finishedRows_);
@@ -234,7 +237,8 @@ class FrameKriging::Stages {
     int firstRow_ = 0, endRow_ = 0;  // of the band
     int differenceRows_ = 0, correctedRows_ = 0, cleanRows_ = 0, finishedRows_ = 0;
     double returned_ = 0, imageLight_ = 0, lightNoise_ = 0;  // Finishing::Counts
-    Image rows_;                                             // finished, on their way out
+    NoiseCorrelation neighbours_;
+    Image rows_;  // finished, on their way out
 };
 
 FrameKriging::FrameKriging(const SampleSource& dump, const Drift& options, Frame& frame,

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "reconstruct/common/methods.h"
+#include "reconstruct/common/relative_error.h"
 #include "reconstruct/drift/pipeline.h"
 #include "reconstruct/sequence/merge.h"
 #include "variolux/base/error.h"
@@ -161,7 +162,9 @@ ReconstructionReport Sequence::reconstruct(int frame, const RowSink& sink, const
     const Frame& plain = own->samples.frame();
     Frame merged(plain.layout(), plain.picture(), impl_->options, plain.width(), plain.height(), Kept::Rows,
                  merge, clock);
-    FrameKriging(*own->source, impl_->options, merged, report, clock).run(sink, progress);
+    MeasuredRows measured(own->outline, sink);
+    FrameKriging(*own->source, impl_->options, merged, report, clock).run(measured.sink(), progress);
+    report.predictedRelMse = measured.relMse();
     SequenceReport& of = drift.sequence.emplace();
     of.wanted = 2 * impl_->options.temporal;
     of.gain = merge.gain();
