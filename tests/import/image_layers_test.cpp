@@ -161,7 +161,8 @@ LayerPart partOf(const std::string& name, const std::vector<std::string>& channe
 
 std::vector<std::string> namesIn(const std::string& path, std::size_t part = 0) {
     std::vector<std::string> names;
-    for (const auto& [name, bytes] : readLayers(path)[part].channels) names.push_back(name);
+    const std::vector<ReadPart> parts = readLayers(path);
+    for (const auto& [name, bytes] : parts[part].channels) names.push_back(name);
     return names;
 }
 
