@@ -43,7 +43,7 @@ ChannelMap plainMap(const Names& names) {
         if (channel.name != kReplicate && contains(names, channel.name)) map[channel.name] = channel.name;
     for (const std::string_view channel : kMotionChannels)
         if (contains(names, std::string(channel))) map[std::string(channel)] = channel;
-    enter(map, "", findColour(names));
+    if (!cyclesLayer(names)) enter(map, "", findColour(names));
     if (map.contains("R"))
         if (const auto alpha = findAlpha(names, map["R"])) map.try_emplace("A", *alpha);
     return map;
