@@ -38,6 +38,12 @@ DumpHeader headerOf(const FlatImages& images, const StackPlan& plan, const std::
     return header;
 }
 
+// Rows are packed by sixteen: bands that cut them are unpacked twice. Wide pictures of many images have to.
+int wholeChunks(int rows) {
+    constexpr int kChunk = 16;
+    return rows < kChunk / 2 ? rows : (rows + kChunk - 1) / kChunk * kChunk;
+}
+
 std::vector<std::string> ignoredChannels(const Names& names, const StackPlan& plan) {
     Names taken, ignored;
     for (const StackChannel& channel : plan.channels) {
@@ -122,8 +128,8 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
     std::optional<FeatureAgreement> agreement;
     Sums sums;
     Duplicates duplicates;
-    const std::size_t ofPasses = passes ? sources.channels(0).size() : 0;
-    const int bandRows = sources.bandRows((header.channels.size() + ofPasses) * images.size());
+    const std::size_t read = std::max(header.channels.size(), passes ? sources.channels(0).size() : 0);
+    const int bandRows = wholeChunks(sources.bandRows(read * images.size()));
     for (int row = 0; row < header.data.height;) {
         const int rows = std::min(bandRows, header.data.height - row);
         sources.read(header.data.y + row, rows);

@@ -73,7 +73,7 @@ TEST(StackLight, EveryLightGroupBecomesRadiance) {
     images = writeFlat(folder, {{{"R", 1}, {"G", 1}, {"B", 1}}});
     EXPECT_NE(errorOf([&] {
                   stackImages(images, folder / "d.exr", options);
-              }).find("L.Combined.R of some layer L, as --groups auto says, found B, G, R"),
+              }).find("L.Combined.R of some layer L, as --groups auto says, found R, G, B"),
               std::string::npos);
 }
 

@@ -43,21 +43,21 @@ struct Plane {
 
 Imf::PixelType typeOf(const std::string& name) { return name == "half" ? Imf::HALF : Imf::FLOAT; }
 
-// Whether an image has the pass in a pixel: something that is neither 0 nor infinitely far away.
+// Neither 0 nor infinitely far away.
+bool isSomething(float value) { return value != 0 && value < kMissed; }
+
+// Whether an image has the pass in a pixel.
 bool has(const FlatImages& images, const std::vector<FlatChannel>& pass, std::size_t pixel) {
-    return std::ranges::any_of(pass, [&](FlatChannel channel) {
-        const float value = images.value(channel, pixel);
-        return value != 0 && value < kMissed;
-    });
+    return std::ranges::any_of(
+        pass, [&](FlatChannel channel) { return isSomething(images.value(channel, pixel)); });
 }
 
-float valueOf(const FlatImages& images, Plane& plane, std::size_t pixel) {
+float valueOf(const FlatImages& images, const Plane& plane, std::size_t pixel) {
     double sum = 0;
     int count = 0;
     for (std::size_t i = 0; i < plane.ofImages.size(); ++i) {
         if (plane.kind != PassKind::Mean && !has(images, plane.pass[i], pixel)) continue;
         const float value = plane.ofImages[i].value(images, pixel);
-        plane.found = true;
         if (plane.kind == PassKind::FirstSample) return value;
         sum += value;
         ++count;
@@ -177,24 +177,33 @@ struct PassFile::Impl {
         }
     }
 
+    // Images come with all channels of a pixel together: a few pixels at a time stay in the cache.
     void average(std::size_t pixels) {
+        constexpr std::size_t kBlock = 64;
         for (Plane& plane : planes) plane.values.resize(pixels);
+        parallelFor(0, static_cast<std::int64_t>((pixels + kBlock - 1) / kBlock), [&](std::int64_t block) {
+            const std::size_t begin = static_cast<std::size_t>(block) * kBlock;
+            average(begin, std::min(begin + kBlock, pixels));
+        });
         parallelFor(0, static_cast<std::int64_t>(planes.size()), [&](std::int64_t i) {
             Plane& plane = planes[static_cast<std::size_t>(i)];
-            if (!plane.ofImages.empty())
-                for (std::size_t p = 0; p < pixels; ++p) plane.values[p] = valueOf(images, plane, p);
+            plane.found = plane.found || std::ranges::any_of(plane.values, isSomething);
+            store(plane);
         });
+    }
+
+    void average(std::size_t begin, std::size_t end) {
+        for (Plane& plane : planes)
+            if (!plane.ofImages.empty())
+                for (std::size_t p = begin; p < end; ++p) plane.values[p] = valueOf(images, plane, p);
         for (std::size_t m = 0; m < mattes.size(); ++m) {
-            const std::size_t channels = mattes[m].channels().size();
-            parallelFor(0, static_cast<std::int64_t>(pixels), [&](std::int64_t i) {
-                const auto p = static_cast<std::size_t>(i);
-                std::vector<float> ranks(channels);
+            std::vector<float> ranks(mattes[m].channels().size());
+            for (std::size_t p = begin; p < end; ++p) {
                 if (mattes[m].merge(images, p, ranks.data()) > 0) ++crowded;
-                for (std::size_t c = 0; c < channels; ++c) planes[firstOfMatte[m] + c].values[p] = ranks[c];
-            });
+                for (std::size_t c = 0; c < ranks.size(); ++c)
+                    planes[firstOfMatte[m] + c].values[p] = ranks[c];
+            }
         }
-        parallelFor(0, static_cast<std::int64_t>(planes.size()),
-                    [&](std::int64_t i) { store(planes[static_cast<std::size_t>(i)]); });
     }
 };
 

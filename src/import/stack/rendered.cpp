@@ -76,11 +76,14 @@ class Extent {
 
 RenderedPixels::RenderedPixels(FlatImages& images, const StackPlan& plan, bool keepEmpty) {
     if (keepEmpty || plan.preset != StackPreset::Cycles || !plan.mapped.contains("A")) return;
-    for (const char* end : {"Depth.Z", "Depth.V"})
-        if (const std::string name = plan.layer + end; contains(images.channels(0), name)) {
-            for (std::size_t i = 0; i < images.size(); ++i) depth_.push_back(images.take(i, name));
-            return;
-        }
+    for (const char* end : {"Depth.Z", "Depth.V"}) {
+        const std::string name = plan.layer + end;
+        std::size_t having = 0;
+        while (having < images.size() && contains(images.channels(having), name)) ++having;
+        if (having < images.size()) continue;
+        for (std::size_t i = 0; i < images.size(); ++i) depth_.push_back(images.take(i, name));
+        return;
+    }
     std::vector<std::string> paths;
     for (std::size_t i = 0; i < images.size(); ++i) paths.push_back(images.path(i));
     Extent extent(paths, plan);
