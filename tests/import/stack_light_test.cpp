@@ -1,5 +1,10 @@
 // Stacks of Blender's files: parts of the light, passes, and what headers say.
 
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIntAttribute.h>
+#include <OpenEXR/ImfOutputFile.h>
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -239,6 +244,24 @@ TEST(StackLight, HeadersSayHowManySamplesAnImageIsOf) {
     report = stackImages(images, folder / "d.exr", {});
     EXPECT_TRUE(anyContains(report.notes, "different numbers of samples (2, 4), but count alike"));
     EXPECT_NEAR(DumpReader(folder / "d.exr").header().averaged, 10.0 / 3, 1e-12);
+}
+
+TEST(StackLight, WholeNumbersInHeadersAreRead) {
+    const TemporaryFolder folder;
+    Imf::Header header(2, 1);
+    for (const char* name : {"R", "G", "B"}) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+    header.insert("samplesPerPixel", Imf::IntAttribute(64));  // as pbrt writes it
+    const float zeros[2] = {};
+    Imf::FrameBuffer frame;
+    for (const char* name : {"R", "G", "B"})
+        frame.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(zeros)), 4, 8));
+    {
+        Imf::OutputFile file((folder / "p.exr").c_str(), header);
+        file.setFrameBuffer(frame);
+        file.writePixels(1);
+    }
+    stackImages({folder / "p.exr"}, folder / "d.exr", {});
+    EXPECT_EQ(DumpReader(folder / "d.exr").header().averaged, 64.0);
 }
 
 TEST(StackLight, TheNoisyImageIsTakenInPlaceOfADenoisedOne) {
