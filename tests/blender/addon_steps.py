@@ -32,7 +32,7 @@ settings.images, settings.samples, settings.quality = 2, 1, "draft"
 settings.output = os.path.join(folder, "new", "still.exr")
 attempt("still")
 found["still node"] = node()
-scene.frame_start, scene.frame_end, scene.frame_step = 2, 3, 1  # changed and not saved: a copy is rendered
+scene.frame_start, scene.frame_end, scene.frame_step = 2, 3, 1  # not saved
 settings.output, settings.temporal = os.path.join(folder, "shot_##.exr"), 1
 attempt("shot", animation=True)
 found["shot node"] = node()

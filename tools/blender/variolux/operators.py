@@ -72,10 +72,8 @@ def end():
 atexit.register(end)
 
 
-def file_to_render(temporary):
-    """The file itself if it is saved as it is, else a copy."""
-    if bpy.data.filepath and not bpy.data.is_dirty:
-        return bpy.data.filepath
+def copy_to_render(temporary):
+    """What is in memory: bpy.data.is_dirty does not know what scripts have changed."""
     path = os.path.join(temporary, os.path.basename(bpy.data.filepath) or "untitled.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False, relative_remap=True)
     return path
@@ -90,7 +88,7 @@ def command(context, animation, temporary):
     os.makedirs(os.path.dirname(output) or ".", exist_ok=True)
     frames = f"{scene.frame_start}-{scene.frame_end}x{scene.frame_step}" if animation else str(scene.frame_current)
     program = context.preferences.addons[__package__].preferences.program
-    words = [bpy.path.abspath(program), file_to_render(temporary), "-o", output, "--frames", frames, "--images", str(settings.images),
+    words = [bpy.path.abspath(program), copy_to_render(temporary), "-o", output, "--frames", frames, "--images", str(settings.images),
              "--spp", str(settings.samples), "--view-layer", context.view_layer.name, "--blender", bpy.app.binary_path,
              "--overwrite", "--log", "json"]
     if settings.use_target:
