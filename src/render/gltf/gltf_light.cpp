@@ -2,36 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 
 namespace vlx::render {
 namespace {
 
 constexpr double kLumensPerWatt = 683;  // of light of 555 nm, and of exporters
-constexpr const char* kBlender = "Khronos glTF Blender I/O v";
-
-bool hasAny(const tinygltf::Value& extras, std::initializer_list<const char*> names) {
-    return extras.IsObject() &&
-           std::ranges::any_of(names, [&](const char* name) { return extras.Has(name); });
-}
-
-/// Whether the file has extras that only this tracer reads.
-bool madeForThis(const tinygltf::Model& model) {
-    const auto ofCamera = [](const tinygltf::Value& extras) {
-        return hasAny(extras, {"lens_radius", "focus_distance", "active"});
-    };
-    const auto ofLight = [](const tinygltf::Value& extras) { return hasAny(extras, {"radius"}); };
-    const auto ofNode = [&](const tinygltf::Node& n) {
-        return (n.camera >= 0 && ofCamera(n.extras)) ||
-               (extension(n.extensions, "KHR_lights_punctual") != nullptr && ofLight(n.extras));
-    };
-    return std::ranges::any_of(model.nodes, ofNode) ||
-           std::ranges::any_of(model.cameras, [&](const auto& c) { return ofCamera(c.extras); }) ||
-           std::ranges::any_of(model.lights, [&](const auto& l) { return ofLight(l.extras); }) ||
-           std::ranges::any_of(model.scenes,
-                               [](const auto& s) { return hasAny(s.extras, {"env_constant"}); });
-}
 
 /// Whether a number of 64 bits is one of 32, but for the rounding of a few operations: one in 10^7 is by
 /// chance.
@@ -41,7 +17,8 @@ bool isSingle(double v) {
 
 }  // namespace
 
-LightReader::LightReader(const GltfFile& file, const tinygltf::Scene* scene, LightUnits units) : file_(file) {
+LightReader::LightReader(const GltfFile& file, const tinygltf::Scene* scene, LightUnits units)
+    : file_(file), dialect_(dialectOf(file.model())) {
     judge(scene);
     if (units == LightUnits::Auto) return;
     told_.clear();
@@ -49,7 +26,7 @@ LightReader::LightReader(const GltfFile& file, const tinygltf::Scene* scene, Lig
 }
 
 void LightReader::judge(const tinygltf::Scene* scene) {
-    if (scene != nullptr && hasAny(scene->extras, {"light_units"})) {
+    if (scene != nullptr && scene->extras.IsObject() && scene->extras.Has("light_units")) {
         const tinygltf::Value& value = scene->extras.Get("light_units");
         const std::string name = value.IsString() ? value.Get<std::string>() : "";
         if (name != "radiometric" && name != "photometric")
@@ -57,15 +34,8 @@ void LightReader::judge(const tinygltf::Scene* scene) {
         lumensPerWatt_ = name == "photometric" ? kLumensPerWatt : 1;
         return;
     }
-    if (madeForThis(file_.model())) return;
-    const std::string& generator = file_.model().asset.generator;
-    if (generator.starts_with(kBlender)) {
-        smoothCones_ = true;
-        const int version = std::atoi(generator.c_str() + std::string_view(kBlender).size());
-        coneCosine_ = version < 4 ? 1.f : 0.f;
-        judgeBlender();
-        return;
-    }
+    if (dialect_.own) return;
+    if (dialect_.blender > 0) return judgeBlender();
     lumensPerWatt_ = kLumensPerWatt;
     told_ =
         "its lights are taken as photometric, in candela and lux, as KHR_lights_punctual has them, and "
@@ -139,11 +109,11 @@ std::optional<Light> LightReader::read(int index, const tinygltf::Node& node, co
 void LightReader::setCone(Light& light, const tinygltf::SpotLight& spot) const {
     const double outer = std::cos(spot.outerConeAngle);
     double width = std::max(0.001, std::cos(spot.innerConeAngle) - outer);
-    if (smoothCones_) {
+    if (dialect_.blender > 0) {
         const double blend = 1 - spot.innerConeAngle / spot.outerConeAngle;
         width = std::max(1e-5, (1 - outer) * std::clamp(blend, 0.0, 1.0));
         light.coneStep = 1;
-        light.coneCosine = coneCosine_;
+        light.coneCosine = dialect_.oldBlender() ? 1.f : 0.f;
     }
     const double scale = 1 / width;
     light.coneScale = static_cast<float>(scale);

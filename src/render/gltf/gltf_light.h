@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "render/gltf/gltf_dialect.h"
 #include "render/gltf/gltf_file.h"
 #include "render/light/light.h"
 #include "render/math/transform.h"
@@ -11,9 +12,7 @@
 namespace vlx::render {
 
 /// The numbers of KHR_lights_punctual, which programs write in their own ways:
-/// - a file made for this tracer says so in its extras: `light_units` ("radiometric" or "photometric") of the
-///   scene; or those that only this tracer reads: cameras' `lens_radius`, `focus_distance`, `active`, lights'
-///   `radius`, a scene's `env_constant`. Its lights are radiometric unless `light_units` says otherwise, its
+/// - one made for this tracer is radiometric, unless the scene's extras have `light_units` "photometric"; its
 ///   spots fade as the extension recommends;
 /// - Blender's exporter writes watts (over 4 pi for points and spots), times 683 lm/W or not, by a mode that
 ///   it does not write. Blender holds watts in 32 bits, and the file has 64: the numbers show whether 683 is
@@ -44,9 +43,8 @@ class LightReader {
     void judgeBlender();
 
     const GltfFile& file_;
+    Dialect dialect_;
     double lumensPerWatt_ = 1;
-    bool smoothCones_ = false;  ///< as Cycles has them
-    float coneCosine_ = 0;
     std::string told_;
 };
 

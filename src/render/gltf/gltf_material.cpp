@@ -133,6 +133,7 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     m.emissionTexture = plain(source.emissiveTexture, Srgb, "emissiveTexture");
     m.normalTexture = plain(source.normalTexture, Linear, "normalTexture");
     m.normalScale = static_cast<float>(source.normalTexture.scale);
+    m.retro = retro_;
     m.doubleSided = source.doubleSided;
     m.alphaMode = source.alphaMode == "MASK"    ? AlphaMode::Mask
                   : source.alphaMode == "BLEND" ? AlphaMode::Blend

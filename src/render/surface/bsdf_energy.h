@@ -33,6 +33,7 @@ BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromIns
       up_(trueNormal),
       alpha_(square(s.roughness)),
       coatAlpha_(square(s.clearcoatRoughness)),
+      retroRoughness_(s.retro ? s.roughness : -1),
       smooth_(alpha_ < kSmoothAlpha),
       coatSmooth_(coatAlpha_ < kSmoothAlpha),
       coat_(s.clearcoat),
