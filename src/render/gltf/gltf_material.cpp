@@ -154,6 +154,8 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
         m.specularTexture = texture(*e, "specularTexture", Linear, what);
         m.specularColour = colour(numbers(*e, "specularColorFactor"), {1, 1, 1});
         m.specularColourTexture = texture(*e, "specularColorTexture", Srgb, what);
+        // A Specular of 0 reflects nothing in that Blender, at grazing angles neither.
+        if (retro_ && isBlack(m.specularColour)) m.specular = 0;
     }
     if (const auto* e = extension(source.extensions, "KHR_materials_transmission")) {
         m.transmission = unit(number(*e, "transmissionFactor", 0));

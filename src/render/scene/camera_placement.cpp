@@ -96,7 +96,10 @@ Viewpoint framed(const Vec3& low, const Vec3& high, double aspect, float vertica
         };
         return Vec3{at(0), at(1), at(2)};
     };
-    return {placed(std::max(x.along, y.along)), placed(dotted(middle, axes[2])), verticalDegrees};
+    const Vec3 extent = high - low;
+    const double nearest =
+        std::ranges::max(corners[2]) + kLeastDistance * static_cast<double>(length(extent));
+    return {placed(std::max({x.along, y.along, nearest})), placed(dotted(middle, axes[2])), verticalDegrees};
 }
 
 }  // namespace vlx::render

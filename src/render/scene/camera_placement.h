@@ -20,8 +20,11 @@ Transform lookingAt(const Vec3& position, const Vec3& target);
 /// False when that is where the target is, sometime: there it is not turned.
 bool turnTowards(Camera& camera, const Vec3& target);
 
-/// The share of the picture's height and width that a framed scene stays clear of on each side.
+/// The share of the picture's height and width that a framed box stays clear of on each side.
 inline constexpr double kFrameMargin = 0.025;
+/// How near to the camera a framed box may come along the axis, in its diagonals: a rod that is seen end on
+/// would touch it.
+inline constexpr double kLeastDistance = 0.1;
 
 /// The viewpoint nearest to a box, in a direction of three quarters, whose picture of the aspect `width` over
 /// height holds the whole of it, kFrameMargin off the sides: from 45 degrees to the right of the front (z

@@ -73,10 +73,12 @@ template <Features F>
 BsdfValue BasicBsdf<F>::diffuse(const Vec3& wi) const {
     if (!isBlack(diffuse_)) countEffect(Effect::Diffuse);
     const float pdf = wi.z * kInvPi;
-    const Rgb body = retroRoughness_ < 0 ? diffuse_ : diffuse_ * retroFactor(wi);
+    const bool retro = retroRoughness_ >= 0;
+    const Rgb body = retro ? diffuse_ * retroFactor(wi) : diffuse_;
     if constexpr (!F.reflection) return {body * pdf, pdf};
     const Albedo atI = row_.at(wi.z);
-    const Rgb f = body * (Rgb(1) - dielectricAlbedo(atI)) + multiple_ * (1 - atI.whole);
+    const Rgb entering = retro ? Rgb(1) : Rgb(1) - dielectricAlbedo(atI);
+    const Rgb f = body * entering + multiple_ * (1 - atI.whole);
     return {f * pdf, pdf};
 }
 

@@ -64,10 +64,11 @@ struct BsdfSample {
 /// what
 ///   is not reflected enters. Reciprocal. c = min(1, base colour / (1 - mean Ed)), so that the base colour is
 ///   the diffuse reflectance that one sees beneath the reflection (as in Disney's and Cycles' models, which
-///   take nothing off it), as far as energy allows: a white surface returns exactly what it gets. With
-///   `retro` times (1 + (r - 1/2) (1 - cos wo)^5) (1 + (r - 1/2) (1 - cos wi)^5), r = roughness (1 + wo .
-///   wi), as Cycles has it up to Blender 3.6: rough surfaces return more at grazing angles, up to more than
-///   they get (Burley, "Physically-based shading at Disney", 2012).
+///   take nothing off it), as far as energy allows: a white surface returns exactly what it gets.
+///   With `retro` it is instead as Cycles has it up to Blender 3.6 (Burley, "Physically-based shading at
+///   Disney", 2012): c / pi (1 + (r - 1/2) (1 - cos wo)^5) (1 + (r - 1/2) (1 - cos wi)^5), c the base colour,
+///   r = roughness (1 + cosine between wo and wi). Nothing is taken off for the reflection, rough surfaces
+///   shine at grazing angles: white ones return more than they get.
 /// - glass (weight (1-metallic) transmission): reflection and refraction by the exact Fresnel term,
 /// refraction
 ///   tinted by the base colour; rough glass is divided by its single-scattering albedo. The surface bounds a
