@@ -1,7 +1,6 @@
 #include "trace/trace_view.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -62,7 +61,9 @@ std::string textOf(const Vec3& v) { return textOf(v.x) + "," + textOf(v.y) + ","
 
 std::pair<Vec3, Vec3> boxOf(const TraceOptions& o, const Scene& loaded, const Shutter& first) {
     if (loaded.shapes.empty())
-        throw Error(o.scene, "has no triangles to place a camera by: give --camera-position and --look-at");
+        throw Error(o.scene,
+                    (loaded.cameraFault.empty() ? "" : loaded.cameraFault + "; and it ") +
+                        "has no triangles to place a camera by: give --camera-position and --look-at");
     if (!o.frame) return {loaded.boundsMin, loaded.boundsMax};
     const Scene start = loadScene(o.scene, o.environment, first, o.lightUnits);
     return {start.boundsMin, start.boundsMax};
@@ -106,17 +107,15 @@ void placeCamera(const TraceOptions& o, Scene& loaded, const Shutter& first) {
         camera.verticalFov = view.verticalDegrees * (kPi / 180);
         camera.orthographicHeight = 0;
     }
-    if (made || placed) {
-        camera.motion = {};
-        camera.course.reset();
-        camera.toWorld = {};
-        for (std::size_t i = 0; i < 3; ++i)
-            camera.toWorld.m[i][3] =
-                static_cast<double>(std::array{view.position.x, view.position.y, view.position.z}[i]);
-    }
-    if ((made || placed || turned) && !turnTowards(camera, view.target))
+    const bool still = made || placed;
+    if (still ? view.position == view.target : turned && !turnTowards(camera, view.target))
         throw CLI::ValidationError("--look-at",
                                    "expected another place than the camera's, found " + textOf(view.target));
+    if (still) {
+        camera.motion = {};
+        camera.course.reset();
+        camera.toWorld = lookingAt(view.position, view.target);
+    }
     if (made)
         note(o, loaded.cameraFault + ": one is made, --camera-position " + textOf(view.position) +
                     " --look-at " + textOf(view.target) + " --fov " + textOf(view.verticalDegrees));
