@@ -415,6 +415,9 @@ TEST(Plan, LightsThatReachNothingAreIdle) {
         Scene alone = t.finish();
         const Plan plan = planOf(alone);
         EXPECT_FALSE(plan.of(PunctualLights).planned);
+        EXPECT_FALSE(plan.lit());
+        ASSERT_EQ(plan.warnings.size(), 1u);
+        EXPECT_NE(plan.warnings[0].find("--env-constant 1,1,1"), std::string::npos) << plan.warnings[0];
         EXPECT_NE(plan.of(PunctualLights).reason.find(c.words), std::string::npos)
             << plan.of(PunctualLights).reason;
         applyPlan(alone, plan);

@@ -133,6 +133,7 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     m.emissionTexture = plain(source.emissiveTexture, Srgb, "emissiveTexture");
     m.normalTexture = plain(source.normalTexture, Linear, "normalTexture");
     m.normalScale = static_cast<float>(source.normalTexture.scale);
+    m.retro = retro_;
     m.doubleSided = source.doubleSided;
     m.alphaMode = source.alphaMode == "MASK"    ? AlphaMode::Mask
                   : source.alphaMode == "BLEND" ? AlphaMode::Blend
@@ -153,6 +154,8 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
         m.specularTexture = texture(*e, "specularTexture", Linear, what);
         m.specularColour = colour(numbers(*e, "specularColorFactor"), {1, 1, 1});
         m.specularColourTexture = texture(*e, "specularColorTexture", Srgb, what);
+        // A Specular of 0 reflects nothing in that Blender, at grazing angles neither.
+        if (retro_ && isBlack(m.specularColour)) m.specular = 0;
     }
     if (const auto* e = extension(source.extensions, "KHR_materials_transmission")) {
         m.transmission = unit(number(*e, "transmissionFactor", 0));

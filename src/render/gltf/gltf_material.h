@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/gltf/gltf_dialect.h"
 #include "render/gltf/gltf_file.h"
 #include "render/scene/material.h"
 
@@ -14,7 +15,8 @@ namespace vlx::render {
 class MaterialReader {
   public:
     /// Appends textures to `textures`.
-    MaterialReader(const GltfFile& file, std::vector<Texture>& textures) : file_(file), textures_(textures) {}
+    MaterialReader(const GltfFile& file, std::vector<Texture>& textures)
+        : file_(file), textures_(textures), retro_(dialectOf(file.model()).oldBlender()) {}
 
     Material read(const tinygltf::Material& source, std::size_t index);
 
@@ -26,6 +28,7 @@ class MaterialReader {
 
     const GltfFile& file_;
     std::vector<Texture>& textures_;
+    bool retro_;
     std::map<std::pair<int, ColourSpace>, int> loaded_;
 };
 

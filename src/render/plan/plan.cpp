@@ -9,6 +9,9 @@
 namespace vlx::render {
 namespace {
 
+constexpr std::array kLightEffects{Effect::EmissiveMeshes, Effect::PunctualLights, Effect::SphereLights,
+                                   Effect::Environment};
+
 std::string quoted(const std::string& kind, const std::string& name, std::size_t index) {
     return kind + " " + (name.empty() ? std::to_string(index) : "'" + name + "'");
 }
@@ -136,6 +139,10 @@ class Analysis {
                                        : "nothing in sight moves from frame to frame"};
     }
 
+    std::string whyIdle(std::size_t light) const {
+        return lightName(light) + " does nothing: " + idle_[light];
+    }
+
     std::vector<std::size_t> idleLights() const {
         std::vector<std::size_t> list;
         for (std::size_t i = 0; i < idle_.size(); ++i)
@@ -214,7 +221,7 @@ class Analysis {
         for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
             if (!is(scene_.lights[i].type)) continue;
             if (idle_[i].empty()) return {true, lightName(i) + " shines"};
-            if (outside.empty()) outside = lightName(i) + " does nothing: " + idle_[i];
+            if (outside.empty()) outside = whyIdle(i);
         }
         return {false, outside.empty() ? "there is no " + kind : outside};
     }
@@ -326,6 +333,10 @@ std::optional<EffectRequest> parseEffects(std::string_view text, std::string& br
     return request;
 }
 
+bool Plan::lit() const {
+    return std::ranges::any_of(kLightEffects, [&](Effect e) { return of(e).called && of(e).planned; });
+}
+
 std::vector<std::string> Plan::simulated() const {
     std::vector<std::string> names;
     for (const PlannedEffect& e : effects)
@@ -350,6 +361,12 @@ Plan planEffects(const Scene& scene, const PlanOptions& options) {
         e.reason = "left out by --effects, although " + finding.reason;
         plan.warnings.push_back("the image is biased: " + std::string(nameOf(effect)) +
                                 " left out, although " + finding.reason);
+    }
+    if (std::ranges::none_of(kLightEffects, [&](Effect e) { return plan.called.has(e); })) {
+        const auto idle = analysis.idleLights();
+        plan.warnings.push_back("no light reaches anything, and the picture is black" +
+                                (idle.empty() ? "" : " (" + analysis.whyIdle(idle.front()) + ")") +
+                                ": --env-constant 1,1,1 or --env IMAGE lights it from all around");
     }
     plan.motion = analysis.motion();
     if (plan.general) return plan;

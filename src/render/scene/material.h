@@ -24,6 +24,7 @@ struct Material {
     TextureRef metallicRoughnessTexture;  ///< g: roughness, b: metallic
     Rgb emission{0, 0, 0};                ///< radiance: emissiveFactor x emissiveStrength
     TextureRef emissionTexture;
+    bool retro = false;  ///< diffuse light as in Disney's model (bsdf_model.h)
     float normalScale = 1;
     TextureRef normalTexture;
 

@@ -62,6 +62,9 @@ struct Instance {
 struct LoadReport {
     std::uint64_t degenerateTriangles = 0;  ///< zero area: dropped
     std::vector<std::string> warnings;
+    std::vector<std::string> notes;  ///< of what is right, as far as is known
+    LightUnits lightUnits =
+        LightUnits::Auto;  ///< in which the file has its punctual lights; Auto: it has none
 };
 
 /// A scene as the tracer wants it. Meshes that one node uses are stored flat in world space; meshes that
@@ -90,6 +93,7 @@ struct Scene {
     std::vector<Camera> cameras;
     std::size_t activeCamera = 0;  ///< the one to use by default: wantedCamera or the first usable one
     std::size_t wantedCamera = 0;  ///< which the file means: marked `active`, or the first
+    std::string cameraFault;       ///< why there is no camera that can be used; empty where there is one
     std::vector<Light> lights;
     Environment environment;
     Shutter shutter;             ///< during which motions were followed

@@ -94,6 +94,7 @@ SurfaceParameters parametersAt(const Scene& scene, const SurfacePoint& point) {
     s.baseColour = F.textures ? m.baseColour * point.colour : m.baseColour;
     s.metallic = m.metallic;
     s.roughness = m.roughness;
+    s.retro = m.retro;
     s.transmission = m.transmission;
     s.ior = m.ior;
     s.specular = m.specular;
