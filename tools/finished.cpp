@@ -9,10 +9,10 @@ namespace {
 // Options that change no pixel, and those that are counted in another way.
 const std::set<std::string>& notCounted() {
     static const std::set<std::string> names = {
-        "--help",       "--help-man",     "--completion", "--version",         "--log",
-        "--quiet",      "--json",         "--threads",    "--max-memory",      "--overwrite",
-        "--output",     "--sampling-map", "--band",       "--frames",          "--pictures",
-        "--fail-above", "--fail-below",   "--stddev",     "--reference-stddev"};
+        "--help",   "--help-man",     "--completion", "--version",    "--log",
+        "--quiet",  "--json",         "--threads",    "--max-memory", "--overwrite",
+        "--output", "--sampling-map", "--band",       "--frames",     "--pictures",
+        "--passes", "--fail-above",   "--fail-below", "--stddev",     "--reference-stddev"};
     return names;
 }
 

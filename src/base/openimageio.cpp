@@ -38,7 +38,9 @@ ImageInfo infoOf(const OIIO::ImageSpec& spec, const char* format) {
         const OIIO::TypeDesc type = attribute.type();
         info.texts[name] = attribute.get_string();
         if (type.aggregate == OIIO::TypeDesc::SCALAR && type.basetype != OIIO::TypeDesc::STRING)
-            info.numbers[name] = static_cast<double>(attribute.get_float());
+            // An int is no float to OpenImageIO.
+            info.numbers[name] = type.is_floating_point() ? static_cast<double>(attribute.get_float())
+                                                          : static_cast<double>(attribute.get_int());
     }
     if (const auto name = info.texts.find("oiio:subimagename"); name != info.texts.end())
         info.part = name->second;

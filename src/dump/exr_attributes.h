@@ -14,6 +14,7 @@ inline constexpr char kRenderer[] = "variolux:renderer";
 inline constexpr char kScene[] = "variolux:scene";
 inline constexpr char kSeed[] = "variolux:seed";
 inline constexpr char kSamples[] = "variolux:samples";
+inline constexpr char kAveraged[] = "variolux:averaged";
 inline constexpr char kPixelFilter[] = "variolux:pixelFilter";
 inline constexpr char kEffects[] = "variolux:effects";
 inline constexpr char kSplatReplicates[] = "variolux:splatReplicates";

@@ -156,6 +156,7 @@ DumpHeader toDumpHeader(const std::string& path, const Imf::Header& header) {
     dump.replicatesShare = value<int>(header, kReplicatesShare).value_or(0) != 0;
     dump.independentHalves = value<int>(header, kIndependentHalves).value_or(0) != 0;
     dump.samples = number(header, kSamples);
+    if (const auto averaged = number(header, kAveraged); averaged && *averaged > 1) dump.averaged = *averaged;
     dump.renderSeconds = number(header, kRenderSeconds);
     if (dump.renderSeconds && !(*dump.renderSeconds > 0)) dump.renderSeconds.reset();  // 0: not recorded
     dump.worldToCamera = matrix(header, kWorldToCamera);

@@ -155,6 +155,7 @@ EncodedHeader encodeHeader(const std::string& path, const DumpHeader& dump) {
         if (dump.independentHalves) samples.insert(kIndependentHalves, Imf::IntAttribute(1));
         if (dump.seed) text(kSeed, std::to_string(*dump.seed));
         if (dump.samples) samples.insert(kSamples, Imf::DoubleAttribute(*dump.samples));
+        if (dump.averaged > 1) samples.insert(kAveraged, Imf::DoubleAttribute(dump.averaged));
         samples.insert(kRenderSeconds, Imf::DoubleAttribute(dump.renderSeconds.value_or(0)));
 
         std::vector<Imf::Header*> parts = {&beauty, &samples};

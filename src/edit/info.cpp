@@ -147,6 +147,8 @@ std::string toText(const DumpInfo& info) {
     line("effects", given(listed(header.effects)));
     line("pixel filter", given(header.pixelFilter));
     if (header.samples) line("asked for", formatted("%g samples a pixel", *header.samples));
+    if (header.averaged > 1)
+        line("each is", "the mean of " + formatted("%g", header.averaged) + " samples of the renderer");
     if (header.seed) line("seed", std::to_string(*header.seed));
     if (header.renderSeconds) line("traced in", formatted("%.2f s", *header.renderSeconds));
     if (header.splatReplicates > 0)
@@ -209,6 +211,7 @@ std::string toJson(const DumpInfo& info) {
         json["motion"] = {{"before", report((*info.motion)[0])}, {"next", report((*info.motion)[1])}};
     }
     if (header.samples) json["samplesAskedFor"] = *header.samples;
+    if (header.averaged > 1) json["averaged"] = header.averaged;
     if (header.splatReplicates > 0) json["splatReplicates"] = header.splatReplicates;
     if (header.seed) json["seed"] = *header.seed;
     if (header.renderSeconds) json["renderSeconds"] = *header.renderSeconds;

@@ -179,6 +179,12 @@ class FlatImages::Source {
     float value(std::size_t pixel, std::size_t index) const {
         return parts_[taken_[index].part].value(pixel, taken_[index].channel);
     }
+    std::string type(const std::string& name) const {
+        const auto found = std::find(names_.begin(), names_.end(), name);
+        if (found == names_.end()) return {};
+        const Place& place = places_[static_cast<std::size_t>(found - names_.begin())];
+        return parts_[place.part].info().types[static_cast<std::size_t>(place.channel)];
+    }
     const std::string& path() const { return path_; }
     const ImageInfo& info() const { return parts_.front().info(); }
     const std::vector<std::string>& names() const { return names_; }
@@ -220,6 +226,9 @@ std::size_t FlatImages::size() const { return sources_.size(); }
 const std::string& FlatImages::path(std::size_t image) const { return sources_[image]->path(); }
 const std::vector<std::string>& FlatImages::channels(std::size_t image) const {
     return sources_[image]->names();
+}
+std::string FlatImages::type(std::size_t image, const std::string& channel) const {
+    return sources_[image]->type(channel);
 }
 Window FlatImages::data() const { return sources_.front()->data(); }
 Window FlatImages::display() const { return sources_.front()->display(); }

@@ -56,6 +56,8 @@ class FlatImages {
     const std::string& path(std::size_t image) const;
     /// Of all flat parts with the first one's data window (partChannel).
     const std::vector<std::string>& channels(std::size_t image) const;
+    /// Type of a channel of an image: "half", "float", ...; "" where it has none of this name.
+    std::string type(std::size_t image, const std::string& channel) const;
     Window data() const;
     Window display() const;
     /// Text attribute of an image, empty when it has none of this name.

@@ -32,8 +32,10 @@ class ImportedSamples : public SampleSource {
 };
 
 /// Files of an image sequence. A path whose file name holds a run of '#' stands for all files whose name has
-/// a number of at least as many digits there (more only without a leading zero), in numeric order; other
-/// paths stand for themselves. Throws Error when no file fits a pattern.
+/// a number of at least as many digits there (more only without a leading zero), in numeric order; one whose
+/// name holds '*' or '?' stands for all files that fit, those of shorter names first; other paths, and those
+/// of files that are there, stand for themselves. Throws Error when no file fits a pattern, and when a name
+/// has both: with --frames the number is a frame's.
 std::vector<std::string> expandSequences(const std::vector<std::string>& paths);
 
 }  // namespace vlx

@@ -1,12 +1,19 @@
 #include "import/stack.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <map>
+#include <numeric>
+#include <optional>
 
-#include "exr/flat_images.h"
-#include "import/channel_presets.h"
+#include "dump/append.h"
+#include "import/stack/doubts.h"
+#include "import/stack/earlier.h"
+#include "import/stack/headers.h"
+#include "import/stack/notes.h"
+#include "import/stack/pass_file.h"
+#include "import/stack/plan.h"
+#include "import/stack/rendered.h"
+#include "import/stack/samples.h"
 #include "variolux/base/error.h"
 #include "variolux/base/text.h"
 #include "variolux/dump/writer.h"
@@ -15,66 +22,85 @@ namespace vlx {
 
 namespace {
 
-constexpr char kReplicate[] = "sample.replicate";
+double sumOf(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-// The dump's channels but for its replicates', motion whole or not at all: readers ask for all of it.
-std::vector<DumpChannel> stackChannels(const ChannelMap& map) {
-    std::vector<DumpChannel> channels = dumpChannels(map, true);
-    const auto mapped = [&](std::string_view name) { return map.contains(std::string(name)); };
-    if (std::any_of(std::begin(kMotionChannels), std::end(kMotionChannels), mapped))
-        for (const std::string_view name : kMotionChannels)
-            if (!mapped(name)) channels.push_back({std::string(name), ChannelType::Float});
-    return channels;
+DumpHeader headerOf(const FlatImages& images, const StackPlan& plan, const std::vector<double>& samples,
+                    const StackOptions& options) {
+    DumpHeader header;
+    header.data = images.data();
+    header.display = images.display();
+    for (const StackChannel& channel : plan.channels) header.channels.push_back(channel.channel);
+    header.compression = options.compression;
+    header.renderer = options.renderer.empty() ? rendererOf(images, plan.layer) : options.renderer;
+    header.samples = static_cast<double>(images.size());
+    if (std::ranges::find(samples, 0.0) == samples.end())  // the mean, where they differ
+        header.averaged = sumOf(samples) / static_cast<double>(samples.size());
+    return header;
 }
 
-// Cycles writes the motion of surfaces, and leaves 0 where a camera ray meets none: of a sky that a moving
-// camera sees that is wrong, of what else it may be (a pane before it) not known either. Returns of how many
-// samples.
-std::int64_t forgetMotionOfMisses(SampleBand& band) {
-    std::vector<std::vector<float>*> motion;
-    for (const std::string_view name : kMotionChannels)
-        if (const int c = band.channel(std::string(name)); c >= 0)
-            motion.push_back(&band.values[static_cast<std::size_t>(c)]);
-    const int depth = band.channel("Z");
-    if (motion.empty() || depth < 0) return 0;
-    std::int64_t count = 0;
-    for (std::size_t s = 0; s < band.samples(); ++s) {
-        const auto still = [&](const auto* values) { return (*values)[s] == 0 || std::isnan((*values)[s]); };
-        if (band.values[static_cast<std::size_t>(depth)][s] != 0 ||
-            !std::all_of(motion.begin(), motion.end(), still))
-            continue;
-        for (auto* values : motion) (*values)[s] = std::numeric_limits<float>::quiet_NaN();
-        ++count;
+// Rows are packed by sixteen: bands that cut them are unpacked twice. Wide pictures of many images have to.
+int wholeChunks(int rows) {
+    constexpr int kChunk = 16;
+    return rows < kChunk / 2 ? rows : (rows + kChunk - 1) / kChunk * kChunk;
+}
+
+std::vector<std::string> ignoredChannels(const Names& names, const StackPlan& plan) {
+    Names taken, ignored;
+    for (const StackChannel& channel : plan.channels) {
+        for (const std::string& source : channel.recipe.sum) taken.push_back(channelFor(names, source).name);
+        if (!channel.recipe.times.empty()) taken.push_back(channel.recipe.times);
     }
-    return count;
+    for (const std::string& name : names)
+        if (!contains(taken, name)) ignored.push_back(name);
+    return ignored;
 }
 
-void noteMotion(const ChannelMap& map, std::int64_t unknown, std::vector<std::string>& notes) {
-    std::vector<std::string> missing;
-    for (const std::string_view name : kMotionChannels)
-        if (!map.contains(std::string(name))) missing.emplace_back(name);
-    if (missing.size() == std::size(kMotionChannels)) return;
-    if (!missing.empty())
-        notes.push_back("The images say nothing about " + listed(missing) + ": not known (NaN) anywhere.");
-    if (unknown > 0)
-        notes.push_back("The motion of " + std::to_string(unknown) +
-                        " samples is not known: Cycles leaves out what is no surface.");
+// Light groups and contributions, against all of the light.
+class Sums {
+  public:
+    void add(const SampleBand& band, const StackPlan& plan) {
+        Names parts;
+        for (const Contribution& part : plan.contributions) parts.push_back(part.name);
+        if (!groups_ && !plan.groups.empty()) groups_.emplace(band, plan.groups);
+        if (!contributions_ && !parts.empty()) contributions_.emplace(band, parts);
+        if (groups_) groups_->add(band);
+        if (contributions_) contributions_->add(band);
+    }
+
+    void note(const StackOptions& options, const StackPlan& plan, const Names& names, bool half,
+              std::vector<std::string>& notes) const {
+        if (groups_)
+            noteSum("Light groups", *groups_, half, " Put all lights, the world and what glows into groups.",
+                    notes);
+        else if (options.groups)
+            notes.push_back("The images have no light groups: none are kept.");
+        const Names missing = missingContributions(names, plan.layer);
+        if (contributions_)
+            noteSum("Contributions", *contributions_, half,
+                    missing.empty() ? "" : " Passes that are not there: " + listed(missing) + ".", notes);
+        else if (!options.passes.empty())
+            notes.push_back("The images have no contributions to keep as radiance; for these turn on " +
+                            listed(missing) + ".");
+    }
+
+  private:
+    std::optional<LightSum> groups_, contributions_;
+};
+
+void noteIdentical(const FlatImages& images, std::vector<std::string>& notes) {
+    std::map<std::uint64_t, std::string> seen;
+    for (std::size_t i = 0; i < images.size(); ++i) {
+        const auto [same, isNew] = seen.emplace(images.hash(i), images.path(i));
+        if (!isNew)
+            notes.push_back("WARNING: " + images.path(i) + " is identical to " + same->second +
+                            ": rendered with the same seed? Errors will be underestimated.");
+    }
 }
 
-// What the preset could not find, or takes in the renderer's own sense.
-void notePreset(StackPreset preset, const ChannelMap& map, std::vector<std::string>& notes) {
-    if (preset == StackPreset::Cycles && map.contains("N.X"))
-        notes.push_back(
-            "Normals are taken as they are: Cycles' denoising normals are in camera space and "
-            "may be shorter than 1.");
-    if (preset == StackPreset::Pbrt && !map.contains("Z"))
-        notes.push_back(
-            "pbrt's gbuffer has positions, no distances: with its default coordinates, camera space, "
-            "--map Z=P.Z takes the depth along the axis.");
-    if (preset == StackPreset::Pbrt || preset == StackPreset::Mitsuba)
-        notes.push_back(
-            "Pixels of these renderers average samples with a filter: only a box filter of one pixel keeps "
-            "pixels independent.");
+template <class Doubt, class... Arguments>
+void note(std::vector<std::string>& notes, const Doubt& doubt, const Arguments&... arguments) {
+    const std::vector<std::string> more = doubt.notes(arguments...);
+    notes.insert(notes.end(), more.begin(), more.end());
 }
 
 }  // namespace
@@ -83,82 +109,77 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
                          const StackOptions& options, const Progress& progress) {
     if (images.empty()) throw Error(dump, "expected images to make a dump of, found none");
     FlatImages sources(images);
-    ImportReport report;
-    const ChosenMap chosen = chooseStackMap(images.front(), sources.channels(0), options);
-    report.mapped = chosen.map;
+    const StackPlan plan = planStack(images.front(), sources.channels(0), options);
+    const std::vector<double> samples = samplesOfImages(sources, plan.layer);
 
-    DumpHeader header;
-    header.data = sources.data();
-    header.display = sources.display();
-    header.channels = stackChannels(report.mapped);
-    header.compression = options.compression;
-    header.renderer = options.renderer.empty() ? sources.text(0, "Software") : options.renderer;
-    header.samples = static_cast<double>(images.size());
-
-    Names taken;
-    std::vector<std::vector<FlatChannel>> channels;  // of each dump channel: of each image, if of any
-    for (const auto& channel : header.channels) {
-        auto& ofImages = channels.emplace_back();
-        const auto source = report.mapped.find(channel.name);
-        if (source == report.mapped.end()) continue;
-        taken.push_back(channelFor(sources.channels(0), source->second).name);
-        for (std::size_t i = 0; i < sources.size(); ++i) ofImages.push_back(sources.take(i, source->second));
-    }
-    for (const auto& name : sources.channels(0))
-        if (!contains(taken, name)) report.ignored.push_back(name);
-
+    DumpHeader header = headerOf(sources, plan, samples, options);
+    const double averaged = header.averaged;
+    std::optional<EarlierStack> earlier;
+    if (!options.append.empty()) earlier.emplace(options.append, header).enterInto(header);
+    StackedSamples stacked(sources, plan, earlier ? earlier->firstReplicate() : 0);
+    RenderedPixels rendered(sources, plan, options.keepEmpty);
+    HalfLimit halfLimit(sources, plan);
+    std::optional<PassFile> passes;
+    if (!options.passes.empty())
+        passes.emplace(options.passes, sources, plan, sumOf(samples), options.inputs);
     setInputs(header, options.inputs);
     DumpWriter writer(dump, header);
-    const int bandRows = sources.bandRows(header.channels.size() * images.size());
-    std::int64_t misses = 0, motionless = 0;
+
+    std::optional<FeatureAgreement> agreement;
+    Sums sums;
+    Duplicates duplicates;
+    const std::size_t read = std::max(header.channels.size(), passes ? sources.channels(0).size() : 0);
+    const int bandRows = wholeChunks(sources.bandRows(read * images.size()));
     for (int row = 0; row < header.data.height;) {
         const int rows = std::min(bandRows, header.data.height - row);
         sources.read(header.data.y + row, rows);
-        SampleBand band;
-        band.x = header.data.x;
-        band.y = header.data.y + row;
-        band.width = header.data.width;
-        band.height = rows;
-        for (std::size_t p = 0; p <= band.pixels(); ++p) band.offsets.push_back(p * sources.size());
-        for (std::size_t c = 0; c < header.channels.size(); ++c) {
-            const std::string& name = header.channels[c].name;
-            band.channels.push_back(name);
-            auto& values = band.values.emplace_back();
-            values.reserve(band.samples());
-            const float unknown = std::numeric_limits<float>::quiet_NaN();
-            for (std::size_t p = 0; p < band.pixels(); ++p)
-                for (std::size_t i = 0; i < sources.size(); ++i)
-                    values.push_back(name == kReplicate    ? static_cast<float>(i)
-                                     : channels[c].empty() ? unknown
-                                                           : sources.value(channels[c][i], p));
-            if (name == "Z")
-                for (float& z : values) misses += cleanDepth(z) ? 1 : 0;
+        SampleBand band = stacked.band(row, rows);
+        if (!agreement) agreement.emplace(band, images.size());
+        agreement->add(band);
+        halfLimit.add(sources, band.pixels());
+        sums.add(band, plan);
+        if (passes) passes->write(rows);
+        const std::vector<char> keep = rendered.of(sources, band);
+        if (earlier) {
+            const SampleBand before = earlier->samples().read(band.y, rows, band.channels);
+            duplicates.add(before, band, images.size());
+            writer.write(joined(before, withoutEmpty(std::move(band), keep, images.size())));
+        } else {
+            writer.write(withoutEmpty(std::move(band), keep, images.size()));
         }
-        if (chosen.preset == StackPreset::Cycles) motionless += forgetMotionOfMisses(band);
-        writer.write(std::move(band));
         row += rows;
         if (progress) progress(row, header.data.height);
     }
     writer.close();
+    if (passes) passes->close();
 
+    ImportReport report;
+    report.mapped = plan.mapped;
+    report.ignored = ignoredChannels(sources.channels(0), plan);
+    report.missing = missingChannels(header);
     auto& notes = report.notes;
-    notes.push_back("Each image is one sample a pixel and one replicate, in the order given.");
+    noteSamples(samples, notes);
     if (!report.mapped.contains("sample.x"))
         notes.push_back("The images say nothing about positions within pixels: none are written.");
     if (report.mapped.contains("Z"))
-        notes.push_back(std::to_string(misses) +
+        notes.push_back(std::to_string(stacked.misses()) +
                         " samples had a depth that is negative, not finite, or 1e9 and more (nothing hit): "
                         "their Z is 0.");
-    noteMotion(report.mapped, motionless, notes);
-    notePreset(chosen.preset, report.mapped, notes);
-    std::map<std::uint64_t, std::string> seen;
-    for (std::size_t i = 0; i < sources.size(); ++i) {
-        const auto [same, isNew] = seen.emplace(sources.hash(i), sources.path(i));
-        if (!isNew)
-            notes.push_back("WARNING: " + sources.path(i) + " is identical to " + same->second +
-                            ": rendered with the same seed? Errors will be underestimated.");
+    noteMotion(report.mapped, stacked.motionless(), notes);
+    notePreset(plan, notes);
+    sums.note(options, plan, sources.channels(0), halfLimit.anyHalf(), notes);
+    if (passes) note(notes, *passes);
+    noteRadiance(plan, notes);
+    if (earlier) {
+        notes.push_back("They are added to the samples of " + options.append + "; replicates go on from " +
+                        std::to_string(earlier->firstReplicate()) + ".");
+        note(notes, *earlier, averaged);
+        note(notes, duplicates, sources, options.append);
     }
-    report.missing = missingChannels(header);
+    note(notes, rendered);
+    note(notes, halfLimit);
+    note(notes, *agreement, plan.preset == StackPreset::Cycles);
+    noteIdentical(sources, notes);
     return report;
 }
 

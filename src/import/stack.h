@@ -25,6 +25,13 @@ struct StackOptions {
     ChannelMap map = {};  ///< entries override the preset's (`--map R=Combined.R`)
     /// Further channels or layers of radiance (radianceChannels), kept under their names.
     std::vector<std::string> radiance = {};
+    bool groups = false;  ///< Cycles: keep the light groups, layers L.Combined_NAME, as radiance too
+    /// Cycles: keep the contributions (stack/cycles_passes.h) as radiance, and write this flat file of all
+    /// passes of the images as one (stack/pass_file.h). Empty: neither.
+    std::string passes = {};
+    /// A dump of the same view: its samples are kept before those of the images. Empty: none.
+    std::string append = {};
+    bool keepEmpty = false;     ///< pixels that were not rendered are samples of 0 (stack/rendered.h)
     std::string renderer = {};  ///< for the header; from the first image's metadata when empty
     DumpCompression compression = DumpCompression::Zips;
     std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
@@ -36,7 +43,9 @@ struct StackOptions {
 /// There are no positions, unless the images have channels for them. Of kMotionChannels there are all or
 /// none: those that the images do not have are NaN, not known. Works by bands of rows: the memory is that of
 /// a few rows of all images. Throws Error when an image cannot be read, has other windows than the first, or
-/// lacks a mapped channel (naming the file and the channels it has), and as DumpWriter.
+/// lacks a mapped channel (naming the file and the channels it has), when the dump to be added to has other
+/// windows or channels, and as DumpWriter. What may be wrong with the images (stack/doubts.h) is a note that
+/// begins with WARNING.
 ImportReport stackImages(const std::vector<std::string>& images, const std::string& dump,
                          const StackOptions& options, const Progress& progress = {});
 

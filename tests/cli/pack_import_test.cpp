@@ -154,5 +154,87 @@ TEST(ToolHelp, EndsWithTheExitCodesAndKnowsItsManualPage) {
     EXPECT_NE(page.out.find(".SS vlx\\-pack moments"), std::string::npos);
 }
 
+// Two frames of two images each, f_0001_sA.exr and so on, as Blender would write them.
+struct Shot {
+    Shot() {
+        const std::vector<std::string> names = {"L.Combined.R",     "L.Combined.G",    "L.Combined.B",
+                                                "L.Combined.A",     "L.Mist.Z",        "L.Combined_key.R",
+                                                "L.Combined_key.G", "L.Combined_key.B"};
+        ImageWriteOptions write;
+        write.attributes["cycles.L.samples"] = "4";
+        for (const int frame : {1, 2})
+            for (const char seed : {'A', 'B'})
+                writeImage(
+                    folder / ("f_000" + std::to_string(frame) + "_s" + seed + ".exr"),
+                    imageOf({0, 0, 4, 3}, names,
+                            [&](int c, int x, int y) {
+                                return static_cast<float>(frame * 100 + seed + x + y + (c == 4 ? 1 : 0));
+                            }),
+                    write);
+    }
+    std::vector<std::string> stack(const std::vector<std::string>& more) const {
+        std::vector<std::string> arguments = {"stack", folder / "f_####_s?.exr", "-o", folder / "d_####.exr"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return arguments;
+    }
+    const TemporaryFolder folder;
+};
+
+TEST(VlxPackStack, FramesAreStackedOneByOne) {
+    const Shot shot;
+    ToolRun run =
+        pack(shot.stack({"--frames", "1-3", "--groups", "auto", "--passes", shot.folder / "p_####.exr"}));
+    EXPECT_EQ(run.exitCode, 1);  // there is no frame 3
+    EXPECT_NE(run.err.find("frame 3: "), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("1 of 3 frames failed: 3"), std::string::npos) << run.err;
+    EXPECT_NE(run.out.find("2 images of 4 samples each"), std::string::npos) << run.out;
+    EXPECT_NE(run.out.find("Light groups add up to the light"), std::string::npos) << run.out;
+    for (const int frame : {1, 2}) {
+        const std::string number = "000" + std::to_string(frame);
+        const SampleBand band = DumpReader(shot.folder / ("d_" + number + ".exr")).read(0, 1, {"R"});
+        EXPECT_EQ(band.values[0][1], static_cast<float>(frame * 100 + 'B'));
+        EXPECT_EQ(readImage(shot.folder / ("p_" + number + ".exr")).at(0, 0)[0],
+                  static_cast<float>(frame * 100) + 65.5f);
+    }
+    run = pack(shot.stack({"--frames", "1,2", "--groups", "auto", "--passes", shot.folder / "p_####.exr"}));
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(run.out, "");
+    EXPECT_NE(run.err.find("d_0002.exr: is finished"), std::string::npos) << run.err;
+    EXPECT_NE(pack({"info", shot.folder / "d_0001.exr"}).out.find("the mean of 4 samples of the renderer"),
+              std::string::npos);
+}
+
+TEST(VlxPackStack, NamesWithoutAPlaceForTheFrameAreBadUsage) {
+    const Shot shot;
+    const std::string one = shot.folder / "f_0001_sA.exr", out = shot.folder / "d.exr";
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"stack", one, "-o", shot.folder / "d_####.exr", "--frames", "1"},
+          {"stack", shot.folder / "f_####_s?.exr", "-o", out, "--frames", "1"},
+          shot.stack({"--frames", "1", "--append", one}),
+          shot.stack({"--frames", "1", "--passes", one}),
+          shot.stack({"--frames", "1", "--groups", "all"})}) {
+        const ToolRun run = pack(arguments);
+        EXPECT_EQ(run.exitCode, 2) << run.out;
+    }
+    const ToolRun both = pack({"stack", shot.folder / "f_####_s?.exr", "-o", out});
+    EXPECT_EQ(both.exitCode, 1);
+    EXPECT_NE(both.err.find("with --frames LIST"), std::string::npos) << both.err;
+}
+
+TEST(VlxPackStack, AnEarlierDumpIsNotOverwritten) {
+    const Shot shot;
+    const std::string a = shot.folder / "f_0001_sA.exr", b = shot.folder / "f_0001_sB.exr";
+    const std::string first = shot.folder / "a.exr", both = shot.folder / "b.exr";
+    EXPECT_EQ(pack({"stack", a, "-o", first}).exitCode, 0);
+    EXPECT_EQ(pack({"stack", b, "-o", first, "--append", first}).exitCode, 2);
+    EXPECT_EQ(pack({"stack", b, "-o", both, "--passes", both}).exitCode, 2);
+    const ToolRun run = pack({"stack", b, "-o", both, "--append", first});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(DumpReader(both).read(0, 1, {"R"}).values[0],
+              (std::vector<float>{165, 166, 166, 167, 167, 168, 168, 169}));
+    EXPECT_NE(pack({"stack", b, "-o", both, "--append", first}).err.find("is finished"), std::string::npos);
+    EXPECT_EQ(pack({"stack", b, "-o", both, "--append", both + "/no"}).exitCode, 1);
+}
+
 }  // namespace
 }  // namespace vlx

@@ -18,6 +18,9 @@ struct PackCommand {
 /// Adds the commands that make dumps of other renderers' files: stack, buffers, moments, bcd, sbmc.
 void addImportCommands(CLI::App& app, std::vector<PackCommand>& commands);
 
+/// One of them.
+void addStackCommand(CLI::App& app, std::vector<PackCommand>& commands);
+
 /// Adds the option --compression of a dump to be written.
 void addCompression(CLI::App& app, DumpCompression& compression);
 

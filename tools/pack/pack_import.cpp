@@ -9,8 +9,8 @@
 #include "import/bcd.h"
 #include "import/moments.h"
 #include "import/sbmc.h"
-#include "import/stack.h"
 #include "import_options.h"
+#include "pack/import_command.h"
 #include "pack/pack_commands.h"
 #include "progress_bar.h"
 #include "tool_main.h"
@@ -18,94 +18,6 @@
 namespace vlx {
 
 namespace {
-
-// What every importer has: an output, how it is written, and the report on standard output.
-struct ImportCommand {
-    std::string dump;
-    std::string renderer;
-    DumpCompression compression = DumpCompression::Zips;
-    bool overwrite = false;
-    const CLI::App* commandLine = nullptr;
-    std::string inputs;  // what the dump says that it is made of
-
-    void bindOutput(CLI::App& app) {
-        commandLine = &app;
-        app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
-        app.add_option("--renderer", renderer, "Name of the renderer, if the files do not tell");
-        addCompression(app, compression);
-        addOverwrite(app, overwrite);
-    }
-    // Whether the dump is there and made of these files, which `fileOptions` name.
-    bool finished(const std::set<std::string>& fileOptions, const std::vector<std::string>& files) {
-        checkOutputName(dump, files);
-        inputs = fingerprintOf(*commandLine, fileOptions, files).text();
-        return !overwrite && isFinished({dump}, inputs);
-    }
-    int print(const ImportReport& report, const std::string& what) const {
-        if (isQuiet()) return kDone;
-        std::cout << dump << ": " << what << "\n";
-        std::cout << toText(report);
-        return kDone;
-    }
-};
-
-// Of the importers that keep further radiance.
-void bindRadiance(CLI::App& app, std::vector<std::string>& radiance) {
-    app.add_option("--radiance", radiance,
-                   "A further channel or layer of radiance to keep under its name, for vlx-krige --radiance; "
-                   "repeatable")
-        ->type_name("NAME")
-        ->expected(1)
-        ->take_all();
-}
-
-struct StackCommand : ImportCommand {
-    std::vector<std::string> mappings, radiance;
-    std::vector<std::string> images;
-    StackPreset preset = StackPreset::Auto;
-
-    void bind(CLI::App& app) {
-        app.description(
-            "Join images of the same view, rendered with different seeds, into a dump of one sample an image "
-            "a "
-            "pixel.\nRender each image with one sample a pixel, and features (albedo, normal, depth) if the "
-            "renderer has them.");
-        app.footer(
-            "Frames of a sequence may have motion, in pixels, y downwards: motion.x, motion.y\n"
-            "from where a point is to where it was in the frame before, motionNext.x, .y to\n"
-            "where it will be in the next. cycles takes all four from the Vector pass.\n\n"
-            "Examples:\n"
-            "  vlx-pack stack cycles_*.exr -o room.exr\n"
-            "  vlx-pack stack 'seed_####.exr' -o room.exr --preset mitsuba\n"
-            "  vlx-pack stack a.exr b.exr -o ab.exr --map R=diffuse.r --map G=diffuse.g --map B=diffuse.b\n"
-            "  vlx-pack stack 'f7_s####.exr' -o f7.exr --map motion.x=-1*flow.x --map motion.y=-1*flow.y");
-        app.add_option("IMAGE", images,
-                       "Flat images of equal size; #### in a name: all files with a number there")
-            ->required();
-        using enum StackPreset;
-        addChoice(
-            app, "--preset", preset,
-            {{"auto", Auto}, {"cycles", Cycles}, {"mitsuba", Mitsuba}, {"pbrt", Pbrt}, {"plain", Plain}},
-            "How channels are named. cycles: Blender's multilayer files with denoising data, and vectors;\n"
-            "mitsuba: the aov integrator's; pbrt: the gbuffer film's; plain: R, G, B and a dump's own\n"
-            "names; auto: what the names look like");
-        bindRadiance(app, radiance);
-        bindMap(app, mappings);
-        bindOutput(app);
-    }
-
-    int run() {
-        images = expandSequences(images);
-        if (finished({"IMAGE"}, images)) return kDone;
-        const StackOptions options{preset, parseMappings(mappings), radiance, renderer, compression, inputs};
-        ImportReport report;
-        {
-            ProgressBar bar("stacking");
-            report = stackImages(images, dump, options, bar);
-        }
-        return print(report, std::to_string(images.size()) + " images");
-    }
-};
 
 struct BuffersCommand : ImportCommand {
     std::vector<std::string> mappings;
@@ -287,6 +199,37 @@ void add(CLI::App& app, const std::string& name, std::vector<PackCommand>& comma
 
 }  // namespace
 
+void ImportCommand::bindOutput(CLI::App& app) {
+    commandLine = &app;
+    app.add_option("-o,--output", dump, "The dump to write (.exr)")->required();
+    app.add_option("--renderer", renderer, "Name of the renderer, if the files do not tell");
+    addCompression(app, compression);
+    addOverwrite(app, overwrite);
+}
+
+bool ImportCommand::finished(const std::set<std::string>& fileOptions,
+                             const std::vector<std::string>& files) {
+    checkOutputName(dump, files);
+    inputs = fingerprintOf(*commandLine, fileOptions, files).text();
+    return !overwrite && isFinished({dump}, inputs);
+}
+
+int ImportCommand::print(const ImportReport& report, const std::string& what) const {
+    if (isQuiet()) return kDone;
+    std::cout << dump << ": " << what << "\n";
+    std::cout << toText(report);
+    return kDone;
+}
+
+void bindRadiance(CLI::App& app, std::vector<std::string>& radiance) {
+    app.add_option("--radiance", radiance,
+                   "A further channel or layer of radiance to keep under its name, for vlx-krige --radiance; "
+                   "repeatable")
+        ->type_name("NAME")
+        ->expected(1)
+        ->take_all();
+}
+
 void addCompression(CLI::App& app, DumpCompression& compression) {
     using enum DumpCompression;
     addChoice(app, "--compression", compression, {{"none", None}, {"rle", Rle}, {"zips", Zips}},
@@ -294,7 +237,7 @@ void addCompression(CLI::App& app, DumpCompression& compression) {
 }
 
 void addImportCommands(CLI::App& app, std::vector<PackCommand>& commands) {
-    add<StackCommand>(app, "stack", commands);
+    addStackCommand(app, commands);
     add<BuffersCommand>(app, "buffers", commands);
     add<MomentsCommand>(app, "moments", commands);
     add<BcdCommand>(app, "bcd", commands);

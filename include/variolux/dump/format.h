@@ -35,7 +35,8 @@ struct DumpHeader {
     std::string pixelFilter;           ///< "box" when samples are spread evenly over their own pixel
     std::vector<std::string> effects;  ///< effects that were simulated; stored joined with ','
     std::optional<std::int64_t> seed;
-    std::optional<double> samples;                    ///< samples a pixel asked for (mean, when adaptive)
+    std::optional<double> samples;  ///< samples a pixel asked for (mean, when adaptive)
+    double averaged = 1;            ///< each sample is itself the mean of that many samples of the renderer
     std::optional<double> renderSeconds;              ///< wall time of tracing
     std::optional<std::vector<float>> worldToCamera;  ///< 16 values, row vectors (OpenEXR convention)
     std::optional<std::vector<float>> worldToNDC;     ///< likewise

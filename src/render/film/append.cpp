@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dump/append.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {
@@ -23,24 +24,11 @@ EarlierDump::EarlierDump(const std::string& path) : reader_(path) {
             throw Error(path, "expected a dump of vlx-trace, found none of its channel " + name);
 }
 
-std::uint64_t EarlierDump::samples() const {
-    std::uint64_t total = 0;
-    const Window& w = header().data;
-    for (int y = w.y; y < w.y + w.height; ++y)
-        for (const std::uint32_t n : reader_.counts(y, 1)) total += n;
-    return total;
-}
+std::uint64_t EarlierDump::samples() const { return samplesOf(reader_); }
 
 std::optional<std::uint32_t> EarlierDump::freeReplicate() const {
     if (!hasReplicates()) return {};
-    constexpr int kRows = 16;
-    std::uint32_t next = 0;
-    const Window& w = header().data;
-    for (int y = w.y; y < w.y + w.height; y += kRows) {
-        const SampleBand band = reader_.read(y, std::min(kRows, w.y + w.height - y), {"sample.replicate"});
-        for (const float v : band.values[0]) next = std::max(next, replicateNumber(v).value() + 1);
-    }
-    return next;
+    return vlx::freeReplicate(reader_);
 }
 
 void EarlierDump::checkSameView(const DumpHeader& traced) const {
@@ -55,29 +43,7 @@ void EarlierDump::checkSameView(const DumpHeader& traced) const {
 }
 
 SampleBand EarlierDump::before(const SampleBand& added) const {
-    const SampleBand old = reader_.read(added.y, added.height, added.channels);
-    SampleBand both;
-    both.x = added.x;
-    both.y = added.y;
-    both.width = added.width;
-    both.height = added.height;
-    both.channels = added.channels;
-    both.offsets.assign(added.pixels() + 1, 0);
-    for (std::size_t p = 0; p <= added.pixels(); ++p) both.offsets[p] = old.offsets[p] + added.offsets[p];
-    for (std::size_t c = 0; c < added.values.size(); ++c) {
-        std::vector<float>& out = both.values.emplace_back();
-        out.reserve(both.samples());
-        const auto take = [&](const SampleBand& from, std::size_t p) {
-            const auto begin = from.values[c].begin();
-            out.insert(out.end(), begin + static_cast<std::ptrdiff_t>(from.offsets[p]),
-                       begin + static_cast<std::ptrdiff_t>(from.offsets[p + 1]));
-        };
-        for (std::size_t p = 0; p < added.pixels(); ++p) {
-            take(old, p);
-            take(added, p);
-        }
-    }
-    return both;
+    return joined(reader_.read(added.y, added.height, added.channels), added);
 }
 
 }  // namespace vlx::render
