@@ -103,7 +103,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     std::optional<EarlierDump> earlier;
     if (!o.earlierPath.empty()) takeSizeOf(o, earlier.emplace(o.earlierPath));
     chooseView(o, loadCameras(o.scene, exposure));
-    Scene loaded = loadScene(o.scene, o.environment, exposure);
+    Scene loaded = loadScene(o.scene, o.environment, exposure, o.variant);
     for (const std::string& warning : loaded.report.warnings) note(o, "warning: " + warning);
     if (loaded.report.degenerateTriangles > 0)
         note(o, std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");

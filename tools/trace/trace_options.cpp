@@ -26,6 +26,10 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
                    "Name or number of the camera (default: the scene's active one, or the\n"
                    "first that can be used)")
         ->type_name("NAME|INDEX");
+    app.add_option("--variant", o.variant,
+                   "Name or number of the variant of materials (KHR_materials_variants; default:\n"
+                   "none, the materials that the scene's meshes name themselves)")
+        ->type_name("NAME|INDEX");
     app.add_flag("--list-cameras", o.listCameras, "Print the scene's cameras and exit");
     app.add_option("--width", o.width, "Of the picture, in pixels (default: 512, or from the height)")
         ->check(CLI::Range(1, 1 << 20));
@@ -152,9 +156,9 @@ void checkOptions(const TraceOptions& o) {
     const std::string atHand = o.listCameras ? "--list-cameras" : o.explain.empty() ? trace : explaining;
     checkOptionUse(*o.commandLine,
                    {{{"--output", "--overwrite", "--compression", "--json", "--band"}, {trace}},
-                    {{"--camera", "--width", "--height", "--crop", "--spp", "--hierarchical", "--tolerance",
-                      "--time", "--replicates", "--target-error", "--append", "--sample-map", "--seed",
-                      "--max-bounces", "--effects", "--integrator", "--explain"},
+                    {{"--camera", "--variant", "--width", "--height", "--crop", "--spp", "--hierarchical",
+                      "--tolerance", "--time", "--replicates", "--target-error", "--append", "--sample-map",
+                      "--seed", "--max-bounces", "--effects", "--integrator", "--explain"},
                      {trace, explaining}}},
                    {atHand});
     if (o.shutter.size() == 2 &&

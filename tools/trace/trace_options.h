@@ -16,6 +16,7 @@ struct TraceOptions {
     std::string scene;
     std::string dump;
     std::string camera;
+    std::string variant;
     int width = 0;
     int height = 0;
     std::vector<int> crop;

@@ -19,7 +19,8 @@ class GltfFile {
     /// What is wanted of a file; the rest is not read, and may be broken.
     enum class Use { Scene, Cameras };
 
-    /// Parses the file and loads its buffers; images stay encoded.
+    /// Parses the file, loads its buffers, and decodes those that meshopt or Draco has compressed; images
+    /// stay encoded.
     explicit GltfFile(const std::string& path, Use use = Use::Scene);
 
     const std::string& path() const { return path_; }
@@ -34,8 +35,8 @@ class GltfFile {
     std::vector<float> floats(int accessor, int components, const std::string& what) const;
     /// The same for vectors of 3 or 4 components (colours): 4 floats each, the fourth 1 when missing.
     std::vector<float> colours(int accessor, const std::string& what) const;
-    /// The values of a scalar accessor of unsigned integers.
-    std::vector<std::uint32_t> indices(int accessor, const std::string& what) const;
+    /// The values of an accessor of unsigned integers, `components` each.
+    std::vector<std::uint32_t> indices(int accessor, const std::string& what, int components = 1) const;
 
     /// The image decoded, four channels.
     Texture image(int index, ColourSpace space) const;
@@ -48,6 +49,10 @@ class GltfFile {
                                            std::size_t stride, std::size_t size,
                                            const std::string& what) const;
     std::vector<double> values(int accessor, int components, const std::string& what) const;
+    // gltf_compressed.cpp: compressed bufferViews and primitives are made plain ones.
+    void decompress();
+    void decodeMeshopt();
+    void decodeDraco(tinygltf::Primitive& primitive, const std::string& what);
 
     std::string path_;
     std::vector<bool> zeroAspects_;

@@ -1,6 +1,8 @@
 #include "render/gltf/gltf_material.h"
 
-#include "render/gltf/gltf_check.h"
+#include <algorithm>
+
+#include "render/gltf/gltf_extensions.h"
 
 namespace vlx::render {
 namespace {
@@ -58,7 +60,6 @@ void applyTransform(TextureRef& ref, const tinygltf::Value& transform) {
     ref.rowU = {static_cast<float>(c * sx), static_cast<float>(s * sy)};
     ref.rowV = {static_cast<float>(-s * sx), static_cast<float>(c * sy)};
     if (offset.size() == 2) ref.offset = {static_cast<float>(offset[0]), static_cast<float>(offset[1])};
-    ref.uvSet = static_cast<int>(number(transform, "texCoord", ref.uvSet));
 }
 
 }  // namespace
@@ -71,11 +72,11 @@ TextureRef MaterialReader::texture(int index, int uvSet, const tinygltf::Extensi
         file_.fail(what + " refers to texture " + std::to_string(index) + ", the file has " +
                    std::to_string(model.textures.size()));
     TextureRef ref;
-    ref.uvSet = uvSet;
-    if (const tinygltf::Value* transform = extension(extensions, "KHR_texture_transform"))
+    if (const tinygltf::Value* transform = extension(extensions, "KHR_texture_transform")) {
         applyTransform(ref, *transform);
-    if (ref.uvSet != 0 && ref.uvSet != 1)
-        file_.fail(what + " uses TEXCOORD_" + std::to_string(ref.uvSet) + ": only 0 and 1 are supported");
+        uvSet = static_cast<int>(number(*transform, "texCoord", uvSet));
+    }
+    ref.uvSlot = slotOf(uvSet);
     const auto key = std::pair(index, space);
     const auto known = loaded_.find(key);
     if (known != loaded_.end()) {
@@ -83,13 +84,16 @@ TextureRef MaterialReader::texture(int index, int uvSet, const tinygltf::Extensi
         return ref;
     }
     const tinygltf::Texture& source = model.textures[static_cast<std::size_t>(index)];
-    if (source.source < 0) {
+    int image = source.source;
+    if (const tinygltf::Value* webp = extension(source.extensions, "EXT_texture_webp"))
+        image = static_cast<int>(number(*webp, "source", image));
+    if (image < 0) {
         std::string only;
         for (const auto& [name, value] : source.extensions)
             if (!isSupported(name)) only += ", only one of " + name + remedyFor(name);
         file_.fail(what + " uses texture " + std::to_string(index) + ", which has no source" + only);
     }
-    Texture loaded = file_.image(source.source, space);
+    Texture loaded = file_.image(image, space);
     if (source.sampler >= 0 && static_cast<std::size_t>(source.sampler) < model.samplers.size()) {
         const tinygltf::Sampler& sampler = model.samplers[static_cast<std::size_t>(source.sampler)];
         loaded.wrapU = wrapOf(sampler.wrapS);
@@ -100,6 +104,26 @@ TextureRef MaterialReader::texture(int index, int uvSet, const tinygltf::Extensi
     textures_.push_back(std::move(loaded));
     loaded_[key] = ref.texture;
     return ref;
+}
+
+int MaterialReader::slotOf(int uvSet) {
+    if (uvSet <= 0) return 0;
+    auto& sets = furtherUvSets_;
+    const auto found = std::ranges::find(sets, uvSet);
+    const auto slot = static_cast<int>(found - sets.begin()) + 1;
+    if (found == sets.end()) sets.push_back(uvSet);
+    return slot;
+}
+
+/// Of all a material says only the base colour matters.
+void MaterialReader::readUnlit(Material& m) const {
+    m.unlit = true;
+    m.emission = m.baseColour;
+    m.emissionTexture = m.baseColourTexture;
+    m.baseColour = {};
+    if (m.alphaMode == AlphaMode::Opaque) m.baseColourTexture = {};
+    m.metallic = m.specular = 0;
+    m.roughness = 1;
 }
 
 /// A textureInfo inside an extension.
@@ -121,11 +145,22 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     const auto plain = [&](const auto& info, ColourSpace space, const char* name) {
         return texture(info.index, info.texCoord, info.extensions, space, what + " " + name);
     };
+    furtherUvSets_.clear();
     Material m;
     m.name = source.name;
     m.baseColour = colour(pbr.baseColorFactor, {1, 1, 1});
     if (pbr.baseColorFactor.size() == 4) m.opacity = unit(pbr.baseColorFactor[3]);
     m.baseColourTexture = plain(pbr.baseColorTexture, Srgb, "baseColorTexture");
+    m.doubleSided = source.doubleSided;
+    m.alphaMode = source.alphaMode == "MASK"    ? AlphaMode::Mask
+                  : source.alphaMode == "BLEND" ? AlphaMode::Blend
+                                                : AlphaMode::Opaque;
+    m.alphaCutoff = static_cast<float>(source.alphaCutoff);
+    if (source.extensions.contains("KHR_materials_unlit")) {
+        readUnlit(m);
+        m.furtherUvSets = furtherUvSets_;
+        return m;
+    }
     m.metallic = unit(pbr.metallicFactor);
     m.roughness = unit(pbr.roughnessFactor);
     m.metallicRoughnessTexture = plain(pbr.metallicRoughnessTexture, Linear, "metallicRoughnessTexture");
@@ -133,11 +168,6 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     m.emissionTexture = plain(source.emissiveTexture, Srgb, "emissiveTexture");
     m.normalTexture = plain(source.normalTexture, Linear, "normalTexture");
     m.normalScale = static_cast<float>(source.normalTexture.scale);
-    m.doubleSided = source.doubleSided;
-    m.alphaMode = source.alphaMode == "MASK"    ? AlphaMode::Mask
-                  : source.alphaMode == "BLEND" ? AlphaMode::Blend
-                                                : AlphaMode::Opaque;
-    m.alphaCutoff = static_cast<float>(source.alphaCutoff);
 
     if (const auto* e = extension(source.extensions, "KHR_materials_emissive_strength"))
         m.emission *= static_cast<float>(std::clamp(number(*e, "emissiveStrength", 1), 0.0, 1e30));
@@ -172,6 +202,7 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
         m.sheenRoughnessTexture = texture(*e, "sheenRoughnessTexture", Linear, what);
     }
     if (const auto* e = extension(source.extensions, "KHR_materials_volume")) m.absorption = absorption(*e);
+    m.furtherUvSets = furtherUvSets_;
     return m;
 }
 

@@ -23,10 +23,13 @@ class MaterialReader {
                        const std::string& what);
     TextureRef texture(const tinygltf::Value& object, const std::string& key, ColourSpace space,
                        const std::string& what);
+    int slotOf(int uvSet);
+    void readUnlit(Material& material) const;
 
     const GltfFile& file_;
     std::vector<Texture>& textures_;
     std::map<std::pair<int, ColourSpace>, int> loaded_;
+    std::vector<int> furtherUvSets_;  ///< of the material that is being read
 };
 
 }  // namespace vlx::render
