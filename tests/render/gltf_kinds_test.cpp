@@ -46,7 +46,7 @@ Picture trace(Scene scene, IntegratorKind kind) {
     });
     for (const Splat& splat : splats) {
         const auto at = static_cast<std::size_t>(splat.y) * kSide + static_cast<std::size_t>(splat.x);
-        picture[at] += splat.radiance * (1.f / kSpp);
+        picture[at] += splat.radiance * (1.f / (kSpp * kSide * kSide));  // each speaks for all pixels
     }
     return picture;
 }

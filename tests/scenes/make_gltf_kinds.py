@@ -244,9 +244,8 @@ def skin_animated():
 def skin_eight():
     """Five influences a vertex, in two sets."""
     f = File()
-    skinned(f, [(0.2, 0.2, 0.2, 0.2, 0.2, 0, 0, 0), (0, 0, 0, 0, 0, 0, 0, 1)], 8, sets=2)
-    shows_skinned(f, (0.5 * 2, 0.5 * 7))
-    f.pictures[-1]["regions"].pop()  # beyond the picture's right
+    skinned(f, [(0.2, 0.2, 0.2, 0.2, 0.2, 0, 0, 0), (0, 0, 0, 0, 0, 0, 1, 0)], 8, sets=2)
+    shows_skinned(f, (0.5 * 2, 0.5 * 6))
     return f
 
 
@@ -637,6 +636,19 @@ def specular():
     return in_the_middle(f, f.surface(roughness=0, specular=some), (F / 2, F, 0), 1e-3)
 
 
+def glossiness():
+    """An archived extension: a coloured reflection, smooth; and a rough one, by a texture, of a colour that is black."""
+    f = File(light=True)
+    gold = {"diffuseFactor": [0, 0, 0, 1], "specularFactor": [0.5, 0.25, 0]}
+    in_the_middle(f, f.surface(pbrSpecularGlossiness=gold), (0.5, 0.25, 0), 1e-3)
+    texture = {"index": f.texture(png([[(255, 255, 255, 0)]]))}
+    dark = {"diffuseFactor": [0.5, 0, 0, 1], "specularFactor": [0, 0, 0], "specularGlossinessTexture": texture}
+    f.quad(f.surface(pbrSpecularGlossiness=dark), -1, 1, 1, 2, attributes={"TEXCOORD_0": f.uvs()})
+    f.shows(-1, 1, 1, 2, None)
+    f.shows(-0.25, 1.25, 0.25, 1.75, (0.5, 0, 0), 0.06, mean=True)
+    return f
+
+
 def sheen():
     """Charlie's distribution with Neubelt's visibility, all that it reflects of light from all around."""
     f = File(light=True)
@@ -713,14 +725,14 @@ def no_camera():
 def no_light():
     f = File(light=STAND_IN)
     f.quad(f.surface((0.5, 0.5, 0.5), specular=DULL), -1, -1, 1, 1)
-    f.shows(-1, -1, 1, 1, (0.5, 0.5, 0.5) if STAND_IN else BLACK)
+    f.shows(-1, -1, 1, 1, (0.5, 0.5, 0.5) if STAND_IN else BLACK, 0.03, mean=True)
     return f
 
 
 KINDS = (skin, skin_animated, skin_eight, morph, morph_node, morph_animated, morph_skin, instancing, animation, spline,
          mirrored, strip, fan, points_and_lines, sparse, quantization, interleaved, files, scenes, draco, meshopt, unlit,
          vertex_colours, second_coordinates, third_coordinates, texture_transform, webp, variants, alpha_mask,
-         alpha_blend, clearcoat, ior, specular, sheen, transmission, volume, emissive_strength,
+         alpha_blend, clearcoat, ior, specular, glossiness, sheen, transmission, volume, emissive_strength,
          orthographic, no_camera, no_light)
 
 

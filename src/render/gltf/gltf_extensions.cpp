@@ -11,8 +11,8 @@ constexpr std::array kSupported = std::to_array<std::string_view>(
     {"KHR_lights_punctual", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_ior",
      "KHR_materials_specular", "KHR_materials_emissive_strength", "KHR_materials_clearcoat",
      "KHR_materials_transmission", "KHR_materials_sheen", "KHR_materials_volume", "KHR_materials_unlit",
-     "KHR_materials_variants", "EXT_mesh_gpu_instancing", "EXT_texture_webp", "KHR_draco_mesh_compression",
-     "EXT_meshopt_compression"});
+     "KHR_materials_pbrSpecularGlossiness", "KHR_materials_variants", "EXT_mesh_gpu_instancing",
+     "EXT_texture_webp", "KHR_draco_mesh_compression", "EXT_meshopt_compression"});
 
 constexpr std::string_view kToPng =
     "turn its textures into PNG, for example with `gltf-transform png IN OUT`";
@@ -33,8 +33,6 @@ constexpr std::array kMissing =
                            {"KHR_materials_anisotropy", "brushed reflections are round"},
                            {"KHR_materials_dispersion", "glass bends all colours alike"},
                            {"KHR_materials_diffuse_transmission", "no light shines through thin sheets"},
-                           {"KHR_materials_pbrSpecularGlossiness",
-                            "its materials have what they say beside it, or are white metal"},
                            {"KHR_materials_volume_scatter", "light is not scattered inside"},
                            {"KHR_animation_pointer", "only nodes and morph targets are animated"},
                            {"KHR_node_visibility", "hidden nodes are shown"},

@@ -3,6 +3,7 @@
 #include <tiny_gltf.h>
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -38,8 +39,8 @@ class GltfFile {
     /// The values of an accessor of unsigned integers, `components` each.
     std::vector<std::uint32_t> indices(int accessor, const std::string& what, int components = 1) const;
 
-    /// The image decoded, four channels.
-    Texture image(int index, ColourSpace space) const;
+    /// The image decoded, four channels. `glossiness`: green becomes the roughness, 1 - it x alpha.
+    Texture image(int index, ColourSpace space, std::optional<float> glossiness = {}) const;
 
   private:
     struct Elements;

@@ -22,11 +22,11 @@ std::vector<Transform> instancesOf(const GltfFile& file, const tinygltf::Node& n
     const auto read = [&](const std::string& name, std::size_t width) {
         if (!attributes.IsObject() || !attributes.Has(name)) return std::vector<float>();
         const std::string place = what + " EXT_mesh_gpu_instancing " + name;
-        const auto accessor = static_cast<int>(number(attributes, name, -1));
-        std::vector<float> values = file.floats(accessor, static_cast<int>(width), place);
-        const std::size_t found = values.size() / width;
+        const auto accessor = static_cast<int>(number(attributes, name, -1));  // checked (gltf_check.h)
+        const std::size_t found = file.model().accessors[static_cast<std::size_t>(accessor)].count;
         if (found > kMostInstances)
             file.fail(place + " has " + std::to_string(found) + " instances, expected 2^24 at most");
+        std::vector<float> values = file.floats(accessor, static_cast<int>(width), place);
         if (!counted.empty() && found != count)
             file.fail(place + " has " + std::to_string(found) + " elements, " + counted + " " +
                       std::to_string(count));
