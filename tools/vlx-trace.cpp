@@ -104,7 +104,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     std::optional<EarlierDump> earlier;
     if (!o.earlierPath.empty()) takeSizeOf(o, earlier.emplace(o.earlierPath));
     chooseView(o, loadCameras(o.scene, exposure));
-    Scene loaded = loadScene(o.scene, o.environment, exposure, o.lightUnits);
+    Scene loaded = loadScene(o.scene, o.environment, exposure, {o.lightUnits, o.variant});
     for (const std::string& warning : loaded.report.warnings) note(o, "warning: " + warning);
     for (const std::string& told : loaded.report.notes) note(o, told);
     if (loaded.report.degenerateTriangles > 0)

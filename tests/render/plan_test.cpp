@@ -158,6 +158,11 @@ Minimal minimal(Effect effect) {
         case EmissiveMeshes:
             add(t, named(TestScene::emitter(Rgb(2))));
             break;
+        case Unlit:
+            m = TestScene::emitter(Rgb(0.4f));
+            m.unlit = true;
+            add(t, named(m));
+            break;
         case SphereLights: {
             Light sphere = lamp();
             sphere.name = "special";

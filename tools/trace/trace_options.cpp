@@ -41,6 +41,10 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
                    "where one is made); makes an orthographic camera a perspective one")
         ->check(finiteWithin(0.01, 179))
         ->type_name("DEGREES");
+    app.add_option("--variant", o.variant,
+                   "Name or number of the variant of materials (KHR_materials_variants; default:\n"
+                   "none, the materials that the scene's meshes name themselves)")
+        ->type_name("NAME|INDEX");
     app.add_flag("--list-cameras", o.listCameras, "Print the scene's cameras and exit");
     app.add_option("--width", o.width, "Of the picture, in pixels (default: 512, or from the height)")
         ->check(CLI::Range(1, 1 << 20));
@@ -174,12 +178,12 @@ void checkOptions(const TraceOptions& o) {
     const std::string atHand = o.listCameras ? "--list-cameras" : o.explain.empty() ? trace : explaining;
     checkOptionUse(*o.commandLine,
                    {{{"--output", "--overwrite", "--compression", "--json", "--band"}, {trace}},
-                    {{"--camera",      "--camera-position", "--look-at",   "--fov",
-                      "--light-units", "--width",           "--height",    "--crop",
-                      "--spp",         "--hierarchical",    "--tolerance", "--time",
-                      "--replicates",  "--target-error",    "--append",    "--sample-map",
-                      "--seed",        "--max-bounces",     "--effects",   "--integrator",
-                      "--explain"},
+                    {{"--camera",     "--variant",     "--camera-position", "--look-at",
+                      "--fov",        "--light-units", "--width",           "--height",
+                      "--crop",       "--spp",         "--hierarchical",    "--tolerance",
+                      "--time",       "--replicates",  "--target-error",    "--append",
+                      "--sample-map", "--seed",        "--max-bounces",     "--effects",
+                      "--integrator", "--explain"},
                      {trace, explaining}}},
                    {atHand});
     if (o.shutter.size() == 2 &&

@@ -19,6 +19,7 @@ struct TraceOptions {
     std::vector<float> position;  // of the camera: three numbers, or none
     std::vector<float> target;
     float verticalDegrees = 0;  // 0: as the camera has it
+    std::string variant;
     int width = 0;
     int height = 0;
     std::vector<int> crop;

@@ -65,7 +65,7 @@ std::pair<Vec3, Vec3> boxOf(const TraceOptions& o, const Scene& loaded, const Sh
                     (loaded.cameraFault.empty() ? "" : loaded.cameraFault + "; and it ") +
                         "has no triangles to place a camera by: give --camera-position and --look-at");
     if (!o.frame) return {loaded.boundsMin, loaded.boundsMax};
-    const Scene start = loadScene(o.scene, o.environment, first, o.lightUnits);
+    const Scene start = loadScene(o.scene, o.environment, first, {o.lightUnits, o.variant});
     return {start.boundsMin, start.boundsMax};
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,11 +26,17 @@ class MaterialReader {
                        const std::string& what);
     TextureRef texture(const tinygltf::Value& object, const std::string& key, ColourSpace space,
                        const std::string& what);
+    Texture load(const tinygltf::Texture& source, int index, ColourSpace space, const std::string& what,
+                 std::optional<float> glossiness = {}) const;
+    int slotOf(int uvSet);
+    void readUnlit(Material& material) const;
+    void readGlossiness(Material& material, const tinygltf::Value& source, const std::string& what);
 
     const GltfFile& file_;
     std::vector<Texture>& textures_;
     bool retro_;
     std::map<std::pair<int, ColourSpace>, int> loaded_;
+    std::vector<int> furtherUvSets_;  ///< of the material that is being read
 };
 
 }  // namespace vlx::render

@@ -55,8 +55,7 @@ Reach::Reach(const Scene& scene, const MaterialRanges& ranges, const PlanOptions
       seen_(scene.shapes.size(), 0) {
     std::vector<Bounds> own(scene.shapes.size());
     for (std::size_t i = 0; i < scene.shapes.size(); ++i)
-        for (std::uint32_t v = 0; v < scene.shapes[i].vertices; ++v)
-            own[i].include(scene.vertices[scene.shapes[i].firstVertex + v].position);
+        for (const Vertex& v : verticesOf(scene, scene.shapes[i])) own[i].include(v.position);
     for (std::size_t i = 0; i < scene.worldShapes; ++i) {
         bounds_[i] = own[i];
         seen_[i] = inView(own[i]);
@@ -173,8 +172,8 @@ bool Reach::coplanar() const {
             origin = position(t[0]);
             normal = normalized(cross(position(t[1]) - *origin, position(t[2]) - *origin));
         }
-        for (std::uint32_t v = 0; v < shape.vertices; ++v)
-            if (std::abs(dot(*normal, position(shape.firstVertex + v) - *origin)) > slack) return false;
+        for (const Vertex& v : verticesOf(scene_, shape))
+            if (std::abs(dot(*normal, v.position - *origin)) > slack) return false;
     }
     return true;
 }

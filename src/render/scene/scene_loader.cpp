@@ -4,12 +4,14 @@
 #include <map>
 
 #include "render/gltf/gltf_camera.h"
-#include "render/gltf/gltf_check.h"
+#include "render/gltf/gltf_extensions.h"
 #include "render/gltf/gltf_file.h"
 #include "render/gltf/gltf_geometry.h"
+#include "render/gltf/gltf_instancing.h"
 #include "render/gltf/gltf_light.h"
 #include "render/gltf/gltf_material.h"
 #include "render/gltf/gltf_nodes.h"
+#include "render/gltf/gltf_variants.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {
@@ -29,19 +31,21 @@ class Loader {
         : file_(path, use),
           model_(file_.model()),
           geometry_(file_, scene_),
-          nodes_(file_, shutter, scene_.report.warnings) {
+          nodes_(file_, shutter, scene_.report.warnings),
+          bends_(file_, nodes_) {
         scene_.name = path.substr(path.find_last_of('/') + 1);
         scene_.shutter = shutter;
         scene_.animations = model_.animations.size();
     }
 
-    Scene load(const EnvironmentOptions& environment, LightUnits units) {
+    Scene load(const EnvironmentOptions& environment, const SceneChoices& choices) {
+        if (!choices.variant.empty()) geometry_.setVariant(variantNamed(file_, choices.variant));
         checkExtensions();
         readMaterials();
         const std::vector<PlacedNode> placed = nodes_.placed();
         if (model_.scenes.empty()) file_.fail("has no scene");
         readCameras(placed);
-        readNodes(placed, units);
+        readNodes(placed, choices.lightUnits);
         readEnvironment(environment);
         if (scene_.shapes.empty() && !scene_.environment)
             file_.fail("has no triangles and no environment (give one with --env-constant or --env)");
@@ -67,8 +71,7 @@ class Loader {
 
     void checkExtensions() {
         for (const std::string& name : model_.extensionsUsed)
-            if (!isSupported(name)) warn("the extension " + name + " is ignored");
-        if (!model_.skins.empty()) warn("skins are left at rest");
+            if (!isSupported(name)) warn("the extension " + name + " is ignored" + missingWithout(name));
     }
 
     void readMaterials() {
@@ -115,12 +118,23 @@ class Loader {
             if (mesh >= model_.meshes.size())
                 file_.fail(what + " refers to mesh " + std::to_string(mesh) + ", the file has " +
                            std::to_string(model_.meshes.size()));
-            if (!usable(place.toWorld) || !std::ranges::all_of(place.motion.places, usable)) {
-                warn(what + " has a transform without an inverse: its mesh is left out");
+            const std::vector<Transform> instances = instancesOf(file_, node, what);
+            if (bends_.bends(place.node)) {
+                if (instances.size() != 1) warn(what + " bends: its instances are left out");
+                readBent(place);
                 continue;
             }
-            if (uses[mesh].empty()) order.push_back(mesh);
-            uses[mesh].push_back(place);
+            if (instances.size() > 1) checkCopies(mesh, instances.size(), what);
+            for (const Transform& instance : instances) {
+                PlacedNode own = place;
+                setInside(own, instance);
+                if (!usable(own.toWorld) || !std::ranges::all_of(own.motion.places, usable)) {
+                    warn(what + " has a transform without an inverse: its mesh is left out");
+                    continue;
+                }
+                if (uses[mesh].empty()) order.push_back(mesh);
+                uses[mesh].push_back(std::move(own));
+            }
         }
         if (!scene_.lights.empty()) {
             scene_.report.lightUnits = lights.units();
@@ -160,10 +174,44 @@ class Loader {
         }
     }
 
+    /// The place of an instance inside a node.
+    static void setInside(PlacedNode& place, const Transform& instance) {
+        place.toWorld = place.toWorld * instance;
+        for (Transform& at : place.motion.places) at = at * instance;
+        if (!place.course) return;
+        for (Motion* motion : {&place.course->before, &place.course->after})
+            for (Transform& at : motion->places) at = at * instance;
+    }
+
+    /// Meshes that shine are copied for each instance: not beyond some gigabytes.
+    void checkCopies(std::size_t mesh, std::size_t copies, const std::string& what) const {
+        constexpr std::size_t kMostVertices = std::size_t{1} << 26;
+        if (!emissive(mesh)) return;
+        std::size_t vertices = 0;
+        for (const tinygltf::Primitive& p : model_.meshes[mesh].primitives)
+            if (const auto found = p.attributes.find("POSITION"); found != p.attributes.end())
+                vertices += model_.accessors[static_cast<std::size_t>(found->second)].count;
+        if (vertices > kMostVertices / copies)
+            file_.fail(what + " has " + std::to_string(copies) + " instances of a mesh that shines, of " +
+                       std::to_string(vertices) +
+                       " vertices: these are copied, 2^26 vertices at most; let an unlit or dark "
+                       "material stand in");
+    }
+
+    /// A skinned or morphing mesh: in the world, as the scene has it at every moment.
+    void readBent(const PlacedNode& place) {
+        const auto mesh = static_cast<std::size_t>(model_.nodes[place.node].mesh);
+        const auto shapes = geometry_.readBent(
+            mesh, [&](int frame, double time) { return bends_.at(place.node, frame, time); },
+            scene_.shutter.frame != 0, bends_.causeOf(place.node));
+        scene_.shapes.insert(scene_.shapes.end(), shapes.begin(), shapes.end());
+    }
+
     bool emissive(std::size_t mesh) const {
         return std::ranges::any_of(model_.meshes[mesh].primitives, [&](const tinygltf::Primitive& p) {
-            return p.material >= 0 && static_cast<std::size_t>(p.material) < scene_.materials.size() &&
-                   scene_.materials[static_cast<std::size_t>(p.material)].emissive();
+            return scene_
+                .materials[geometry_.materialOf(p, described("mesh", mesh, model_.meshes[mesh].name))]
+                .shines();
         });
     }
 
@@ -238,13 +286,14 @@ class Loader {
     Scene scene_;
     GeometryReader geometry_;
     NodeTree nodes_;
+    Bends bends_;
 };
 
 }  // namespace
 
 Scene loadScene(const std::string& path, const EnvironmentOptions& environment, const Shutter& shutter,
-                LightUnits units) {
-    return Loader(path, shutter).load(environment, units);
+                const SceneChoices& choices) {
+    return Loader(path, shutter).load(environment, choices);
 }
 
 Scene loadCameras(const std::string& path, const Shutter& shutter) {
