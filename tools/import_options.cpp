@@ -71,6 +71,10 @@ void MomentFlags::bind(CLI::App& app, const std::string& group) {
     app.add_option("--variance", options_.with.variance, "Image of the variance, if it is another file");
     bindCompanions(app, options_.with);
     bindSamples(app, options_.samples);
+    app.add_option("--layer", options_.layer,
+                   "Where R, G, B are: a layer (beauty, ViewLayer.Combined_key) or the view layer whose "
+                   "Combined to take (ViewLayer2)")
+        ->option_text("NAME");
     bindMap(app, mappings_);
     for (CLI::Option* option : app.get_options())
         if (std::ranges::find(before, option) == before.end()) option->group(group);

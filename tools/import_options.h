@@ -20,7 +20,7 @@ void bindCompanions(CLI::App& app, CompanionImages& with);
 void bindSamples(CLI::App& app, double& samples);
 
 /// An image that has a variance for each pixel: --preset, --variance-is, --variance-of, --variance,
-/// companions, --samples, --map.
+/// companions, --samples, --layer, --map.
 class MomentFlags {
   public:
     void bind(CLI::App& app, const std::string& group = "Options");

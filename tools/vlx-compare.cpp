@@ -12,6 +12,7 @@
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
 #include "variolux/base/parallel.h"
+#include "variolux/compare/colour_image.h"
 #include "variolux/compare/metrics.h"
 #include "variolux/compare/picture.h"
 #include "variolux/compare/report.h"
@@ -19,8 +20,6 @@
 namespace {
 
 using namespace vlx;
-
-constexpr const char* kStddev = "stddev";
 
 struct Options {
     std::string reference;
@@ -44,9 +43,11 @@ void bind(CLI::App& app, Options& options) {
     app.add_option("REFERENCE", options.reference, "The image to measure against")->required();
     app.add_option("IMAGE", options.images, "Images to measure; data windows must equal the reference's")
         ->required();
-    app.add_option("--layer", options.layer,
-                   "Compare the channels NAME.R, NAME.G, NAME.B of every file that has them, and R, G, B of "
-                   "the others")
+    app.add_option(
+           "--layer", options.layer,
+           "Compare the layer of this name (ViewLayer.Combined_key), or Combined of the view layer of this "
+           "name (ViewLayer2), of every file that has it, and of the others what is compared without: R, "
+           "G, B, or the layer where renderers keep their picture")
         ->option_text("NAME");
 
     const char* const output = "Output";
@@ -93,7 +94,7 @@ void bind(CLI::App& app, Options& options) {
         ->group(checks);
     app.add_flag("--stddev", options.stddev,
                  "Check the error maps: the share of values of an image within 1 and 2 of its own standard "
-                 "deviations (stddev.R, stddev.G, stddev.B) of the reference")
+                 "deviations (layer stddev, as vlx-krige writes it) of the reference")
         ->group(checks);
     app.add_flag("--reference-stddev", options.referenceStddev,
                  "Add the variance of the reference's own stddev layer to the image's")
@@ -123,7 +124,10 @@ void bind(CLI::App& app, Options& options) {
 
 Pixels that are not finite in x or r are left out of all but the counts, and
 reported. Values are compared as stored: PNG and JPEG hold display values, not
-radiance. Of a sample dump, its flat beauty part is read.
+radiance. Of a sample dump, its flat beauty part is read. In a file of layers
+the picture is Combined of Blender's first view layer (its compositor's picture
+only where that is all there is), else R, G, B, else RGBA, rgba, beauty or Ci;
+its stddev is that of the same view layer. --layer chooses another.
 
 Exit codes: 0 done; 1 a file cannot be read, compared or written; 2 bad usage;
 3 a limit was passed.
@@ -151,23 +155,12 @@ auto parsed(const char* option, const Parse& parse) {
     }
 }
 
-struct Input {
+struct Input : ColourImage {
     std::string path;
-    std::array<std::string, 3> channels;
-    Image colour;
-    std::optional<Image> stddev;
-    bool layerFound;
 };
 
 Input readInput(const std::string& path, const Options& options, bool wantStddev) {
-    const Image image = readImage(path);
-    Input input{path,
-                colourChannels(image, path, options.layer),
-                colourOf(image, path, options.layer),
-                {},
-                hasLayer(image, options.layer)};
-    if (wantStddev && hasLayer(image, kStddev)) input.stddev = colourOf(image, path, kStddev);
-    return input;
+    return {readColour(path, options.layer, wantStddev), path};
 }
 
 std::vector<std::string> pictureFiles(const Options& options) {
@@ -241,7 +234,8 @@ int run(const Options& options) {
     const Input reference = readInput(options.reference, options, options.referenceStddev);
     if (options.referenceStddev && !reference.stddev)
         throw Error(options.reference, "expected channels stddev.R, stddev.G, stddev.B, found none");
-    bool layerFound = reference.layerFound;
+    LayerSearch layer(options.layer);
+    layer.add(reference);
     bool stddevFound = false;
     Report report{options.reference, reference.channels, reference.colour.data, {}, {}};
     std::vector<Input> inputs;
@@ -256,12 +250,11 @@ int run(const Options& options) {
             entry.calibration =
                 checkCalibration(reference.colour, input.colour, *input.stddev, reference.stddev, input.path);
         report.images.push_back(std::move(entry));
-        layerFound = layerFound || input.layerFound;
+        layer.add(input);
         stddevFound = stddevFound || input.stddev;
         if (made) inputs.push_back(std::move(input));
     }
-    if (!options.layer.empty() && !layerFound)
-        throw Error(options.layer, "expected a layer of this name in at least one file, found none");
+    layer.check();
     if (options.stddev && !stddevFound)
         throw Error("--stddev", "expected an image with channels stddev.R, stddev.G, stddev.B, found none");
     report.violations = checkLimits(report, limits);

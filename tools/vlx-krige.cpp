@@ -66,7 +66,7 @@ vlx::ChannelMap replacedLayers(const vlx::KrigeOptions& o, const std::string& or
         original == o.input && moments)
         map = moments->report().mapped;
     else
-        map = vlx::findRadiance(original, o.moments.options().map);
+        map = vlx::findRadiance(original, o.moments.options().map, o.moments.options().layer);
     std::erase_if(map, [](const auto& entry) {
         return entry.first != "R" && entry.first != "G" && entry.first != "B" && entry.first != "A";
     });

@@ -10,6 +10,7 @@
 #include <half.h>
 #include <openexr.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -19,6 +20,7 @@
 #include <type_traits>
 
 #include "base/image_library.h"
+#include "variolux/base/channel_names.h"
 #include "variolux/base/error.h"
 #include "variolux/base/memory.h"
 #include "variolux/base/output_file.h"
@@ -86,21 +88,25 @@ std::string checkExrHeaders(const std::string& path) {
     return {};
 }
 
-}  // namespace
+/// An image at its first flat part, whose size was checked.
+struct OpenedImage {
+    std::unique_ptr<ImageInput> input;
+    int part = 0;
+};
 
-Image readImage(const std::string& path) {
+OpenedImage openImage(const std::string& path) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status))
         throw Error(path, "expected an image, found no such file");
     const std::string fault = checkExrHeaders(path);
     std::string said;
-    const auto input = imageLibrary().open(path, said);
-    if (!input) throw Error(path, "expected an image: " + (fault.empty() ? said : fault));
-    int part = 0;
-    while (input->info().deep)
-        if (!input->seek(++part)) throw Error(path, "expected a flat image, found only deep samples");
+    OpenedImage opened{imageLibrary().open(path, said)};
+    if (!opened.input) throw Error(path, "expected an image: " + (fault.empty() ? said : fault));
+    while (opened.input->info().deep)
+        if (!opened.input->seek(++opened.part))
+            throw Error(path, "expected a flat image, found only deep samples");
 
-    const ImageInfo& info = input->info();
+    const ImageInfo& info = opened.input->info();
     const Window& data = info.data;
     const auto channels = static_cast<int>(info.channels.size());
     if (data.width <= 0 || data.height <= 0 || channels <= 0 || info.depth > 1)
@@ -109,12 +115,91 @@ Image readImage(const std::string& path) {
                               std::to_string(info.depth) + ", " + std::to_string(channels) + " channels");
     const bool lossy = info.format != "openexr" || info.text("compression").starts_with("dwa");
     checkSize(path, data.width, data.height, channels, lossy);
-    requireMemory(path, imageBytes(data, info.channels.size()), "an image held whole");
+    return opened;
+}
 
-    Image image(data, info.channels);
+[[noreturn]] void failReading(const std::string& path, const Window& data, ImageInput& input) {
+    throw Error(path, "expected " + std::to_string(data.height) + " whole rows: " + input.error());
+}
+
+/// A part of an image, and which of its channels are wanted.
+struct WantedPart {
+    int number;
+    ImageInfo info;
+    std::vector<std::pair<int, std::size_t>> channels;  ///< of the part; of the image that is made
+};
+
+/// By bands: what lies between the channels that are wanted is read, too.
+void readPart(const std::string& path, ImageInput& input, const WantedPart& part, Image& image) {
+    constexpr int kBandRows = 256;
+    const bool tiled = part.info.tileHeight > 0;
+    const int band = tiled ? part.info.tileHeight : kBandRows;
+    const auto [first, last] = std::ranges::minmax_element(part.channels);
+    const int begin = first->first, end = last->first + 1;
+    const auto width = static_cast<std::size_t>(image.data.width),
+               count = static_cast<std::size_t>(end - begin), made = image.channels.size();
+    std::vector<float> rows;
+    float* to = image.pixels.data();
+    const int bottom = image.data.y + image.data.height;
+    for (int y = image.data.y; y < bottom; y += band) {
+        const int until = std::min(bottom, y + band);
+        const std::size_t pixels = width * static_cast<std::size_t>(until - y);
+        rows.resize(pixels * count);
+        if (!(tiled ? input.readTileRows(part.number, y, until, begin, end, rows.data())
+                    : input.readRows(part.number, y, until, begin, end, rows.data())))
+            failReading(path, image.data, input);
+        for (const auto& [channel, place] : part.channels)
+            for (std::size_t p = 0; p < pixels; ++p)
+                to[p * made + place] = rows[p * count + static_cast<std::size_t>(channel - begin)];
+        to += pixels * made;
+    }
+}
+
+}  // namespace
+
+Image readImage(const std::string& path) {
+    const OpenedImage opened = openImage(path);
+    const ImageInfo& info = opened.input->info();
+    requireMemory(path, imageBytes(info.data, info.channels.size()), "an image held whole");
+    Image image(info.data, info.channels);
     image.display = info.display;
-    if (!input->readAll(part, image.pixels.data()))
-        throw Error(path, "expected " + std::to_string(data.height) + " whole rows: " + input->error());
+    if (!opened.input->readAll(opened.part, image.pixels.data()))
+        failReading(path, image.data, *opened.input);
+    return image;
+}
+
+Image readImage(const std::string& path, const ChannelChoice& choose) {
+    const OpenedImage opened = openImage(path);
+    std::vector<WantedPart> parts;
+    std::vector<std::string> names;
+    std::vector<std::pair<std::size_t, int>> places;  // of each name: part, channel
+    for (int number = opened.part; opened.input->seek(number); ++number) {
+        const ImageInfo& info = opened.input->info();
+        if (number > opened.part && (info.deep || info.data != parts.front().info.data || info.depth > 1))
+            continue;
+        for (std::size_t c = 0; c < info.channels.size(); ++c) {
+            std::string known = partChannel(number - opened.part, info.part, info.channels[c]);
+            if (std::ranges::find(names, known) != names.end()) continue;
+            names.push_back(std::move(known));
+            places.emplace_back(parts.size(), static_cast<int>(c));
+        }
+        parts.push_back({number, info, {}});
+    }
+    const ImageInfo& info = parts.front().info;
+    const std::vector<std::string> wanted = choose(names);
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+        const auto found = std::ranges::find(names, wanted[i]);
+        if (found == names.end())
+            throw Error(path,
+                        "expected a channel " + wanted[i] + ", found the layers " + listedLayers(names));
+        const auto& [part, channel] = places[static_cast<std::size_t>(found - names.begin())];
+        parts[part].channels.emplace_back(channel, i);
+    }
+    requireMemory(path, imageBytes(info.data, wanted.size()), "the channels of an image");
+    Image image(info.data, wanted);
+    image.display = info.display;
+    for (const WantedPart& part : parts)
+        if (!part.channels.empty()) readPart(path, *opened.input, part, image);
     return image;
 }
 

@@ -121,34 +121,6 @@ double toneMapped(double linear) {
     return linear >= 1 ? 1 : std::pow(linear, 1 / 2.2);
 }
 
-bool hasLayer(const Image& image, std::string_view layer) {
-    const std::string prefix = std::string(layer) + ".";
-    return image.channel(prefix + "R") >= 0 && image.channel(prefix + "G") >= 0 &&
-           image.channel(prefix + "B") >= 0;
-}
-
-std::array<std::string, 3> colourChannels(const Image& image, const std::string& path,
-                                          const std::string& layer) {
-    if (!layer.empty() && hasLayer(image, layer)) return {layer + ".R", layer + ".G", layer + ".B"};
-    if (image.channel("R") >= 0 && image.channel("G") >= 0 && image.channel("B") >= 0) return {"R", "G", "B"};
-    if (image.channel("Y") >= 0) return {"Y", "Y", "Y"};
-    if (image.channelCount() == 1) return {image.channels[0], image.channels[0], image.channels[0]};
-    throw Error(path, "expected channels R, G, B" + (layer.empty() ? "" : " or " + layer + ".R, .G, .B") +
-                          " or a grey image, found " + listed(image.channels));
-}
-
-Image colourOf(const Image& image, const std::string& path, const std::string& layer) {
-    const std::array<std::string, 3> names = colourChannels(image, path, layer);
-    const std::array<int, 3> from = {image.channel(names[0]), image.channel(names[1]),
-                                     image.channel(names[2])};
-    Image colour(image.data, {"R", "G", "B"});
-    colour.display = image.display;
-    for (int row = 0; row < image.data.height; ++row)
-        for (int col = 0; col < image.data.width; ++col)
-            for (std::size_t c = 0; c < 3; ++c) colour.at(col, row)[c] = image.at(col, row)[from[c]];
-    return colour;
-}
-
 Comparison compareColour(const Image& reference, const Image& image, const std::string& path) {
     requireSameWindow(reference, image, path);
     const int width = image.data.width;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "variolux/base/channel_names.h"
 #include "variolux/base/fingerprint.h"
 #include "variolux/base/image_io.h"
 
@@ -56,19 +57,6 @@ std::vector<MissingPart> missingChannels(const DumpHeader& header) {
     if (header.pixelFilter.empty())
         lacks("pixel filter (variolux:pixelFilter)", "a box filter of one pixel is assumed");
     return missing;
-}
-
-std::optional<std::array<std::string, 3>> layerTriple(const std::vector<std::string>& names,
-                                                      const std::string& layer) {
-    for (const char* ends : {"RGB", "rgb", "XYZ", "xyz"}) {
-        std::array<std::string, 3> triple;
-        for (std::size_t c = 0; c < 3; ++c) triple[c] = (layer.empty() ? "" : layer + ".") + ends[c];
-        if (std::all_of(triple.begin(), triple.end(), [&](const std::string& name) {
-                return std::find(names.begin(), names.end(), name) != names.end();
-            }))
-            return triple;
-    }
-    return std::nullopt;
 }
 
 std::vector<std::string> radianceChannels(const std::vector<std::string>& names, const std::string& name) {

@@ -8,6 +8,7 @@
 
 #include "base/image_library.h"
 #include "exr/flat_header.h"
+#include "variolux/base/channel_names.h"
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
@@ -68,11 +69,6 @@ std::optional<ScaledChannel> parseScaled(const std::string& text) {
 ScaledChannel channelFor(const std::vector<std::string>& names, const std::string& source) {
     if (contains(names, source)) return {source};
     return parseScaled(source).value_or(ScaledChannel{source});
-}
-
-std::string partChannel(int part, const std::string& partName, const std::string& channel) {
-    if (part == 0 || partName.empty() || channel.starts_with(partName + ".")) return channel;
-    return partName + "." + channel;
 }
 
 // What is taken from one part of an image, in rows of interleaved values.

@@ -19,10 +19,6 @@ std::unique_ptr<ImageInput> openFlat(const std::string& path);
 
 bool contains(const std::vector<std::string>& names, const std::string& name);
 
-/// What a channel of a file of several parts is called: as it is in the first part; with the part's name
-/// before it in others, unless it begins with it.
-std::string partChannel(int part, const std::string& partName, const std::string& channel);
-
 /// A channel, its values multiplied by a factor.
 struct ScaledChannel {
     std::string name;

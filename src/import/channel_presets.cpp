@@ -43,7 +43,9 @@ ChannelMap plainMap(const Names& names) {
         if (channel.name != kReplicate && contains(names, channel.name)) map[channel.name] = channel.name;
     for (const std::string_view channel : kMotionChannels)
         if (contains(names, std::string(channel))) map[std::string(channel)] = channel;
-    if (!findTriple(names, {""})) enter(map, "", findLuminance(names, {""}));
+    if (!cyclesLayer(names)) enter(map, "", findColour(names));
+    if (map.contains("R"))
+        if (const auto alpha = findAlpha(names, map["R"])) map.try_emplace("A", *alpha);
     return map;
 }
 
@@ -68,11 +70,8 @@ ChannelMap mitsubaMap(const Names& names) {
     for (const auto& layer : layersWith(names, ".R"))
         if (!map.contains("albedo.R") || map["albedo.R"] != layer + ".R") colours.push_back(layer);
     enter(map, "", findTriple(names, colours));
-    if (map.contains("R")) {
-        const std::string red = map["R"];
-        const std::string alpha = red.substr(0, red.size() - 1) + "A";
-        if (contains(names, alpha)) map["A"] = alpha;
-    }
+    if (map.contains("R"))
+        if (const auto alpha = findAlpha(names, map["R"])) map["A"] = *alpha;
     return map;
 }
 
@@ -120,26 +119,25 @@ void enter(ChannelMap& map, const std::string& to, const std::optional<std::arra
     for (std::size_t c = 0; c < 3; ++c) map.try_emplace((to.empty() ? "" : to + ".") + ends[c], (*from)[c]);
 }
 
-std::optional<std::string> cyclesLayer(const Names& names) {
-    const std::string pass = "Combined.R";
-    for (const auto& name : names) {
-        if (!name.ends_with(pass)) continue;
-        const std::string layer = name.substr(0, name.size() - pass.size());
-        if (layer.empty() || layer.back() == '.') return layer;
-    }
-    return std::nullopt;
+ChannelTriple namedLayer(const std::string& path, const Names& names, const std::string& layer) {
+    if (auto found = findColour(names, layer)) return *found;
+    throw Error(path, "expected a layer " + layer + " of colours, or a view layer " + layer +
+                          " that has Combined, as --layer says, found the layers " + listedLayers(names));
 }
 
 ChosenMap chooseStackMap(const std::string& path, const Names& names, const StackOptions& options) {
     ChosenMap chosen;
     chosen.preset = options.preset == StackPreset::Auto ? recogniseStack(names) : options.preset;
+    std::optional<ChannelTriple> named;
+    if (!options.layer.empty()) named = namedLayer(path, names, options.layer);
     switch (chosen.preset) {
         case StackPreset::Cycles: {
-            const auto layer = cyclesLayer(names);
+            const auto layer = named ? std::optional(layerPrefix(named->front())) : cyclesLayer(names);
             if (!layer)
-                throw Error(
-                    path, "expected a channel L.Combined.R of some layer L, as --preset cycles says, found " +
-                              listed(names));
+                throw Error(path,
+                            "expected a channel L.Combined.R of some layer L, as --preset cycles says, found "
+                            "the layers " +
+                                listedLayers(names));
             chosen.map = cyclesMap(names, *layer);
             break;
         }
@@ -151,6 +149,11 @@ ChosenMap chooseStackMap(const std::string& path, const Names& names, const Stac
             break;
         default:
             chosen.map = plainMap(names);
+    }
+    if (named) {
+        for (const char* c : {"R", "G", "B", "A"}) chosen.map.erase(c);
+        enter(chosen.map, "", named);
+        if (const auto alpha = findAlpha(names, named->front())) chosen.map["A"] = *alpha;
     }
     for (const auto& [channel, source] : options.map) {
         if (channel == kReplicate)

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "import/stack.h"
+#include "variolux/base/channel_names.h"
 
 namespace vlx {
 
@@ -27,8 +28,8 @@ std::optional<std::string> findNumber(const Names& names, const Names& layers);
 /// there.
 void enter(ChannelMap& map, const std::string& to, const std::optional<std::array<std::string, 3>>& from);
 
-/// "L." of the first layer L that has a pass Combined; empty names of layers count. Nothing if none has.
-std::optional<std::string> cyclesLayer(const Names& names);
+/// The colours of the layer that --layer names: findColour(). Throws Error, listing the layers there are.
+ChannelTriple namedLayer(const std::string& path, const Names& names, const std::string& layer);
 
 struct ChosenMap {
     ChannelMap map;

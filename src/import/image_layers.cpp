@@ -24,6 +24,7 @@
 #include "exr/flat_header.h"
 #include "exr/flat_images.h"
 #include "import/channel_presets.h"
+#include "variolux/base/channel_names.h"
 #include "variolux/base/error.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/text.h"
@@ -138,7 +139,6 @@ class Planner {
 
     std::vector<PartPlan> plan(const Imf::MultiPartInputFile& file) {
         std::vector<PartPlan> plans;
-        std::vector<std::string> names;
         for (int number = 0; number < file.parts(); ++number) {
             PartPlan& plan = plans.emplace_back(PartPlan{file.header(number), {}, false});
             const Imf::ChannelList& list = file.header(number).channels();
@@ -146,17 +146,25 @@ class Planner {
                 Channel& channel = plan.channels.emplace_back();
                 channel.name = it.name();
                 channel.type = it.channel().type;
-                const std::string known = partChannel(number, partName(plan.header), channel.name);
-                if (contains(names, known)) continue;
-                names.push_back(known);
-                takeFor(known, channel, plan, number);
+                std::string known = partChannel(number, partName(plan.header), channel.name);
+                if (contains(names_, known)) continue;
+                if (isFor(known, "R")) {
+                    main_ = number;
+                    prefix_ = layerPrefix(channel.name);
+                }
+                names_.push_back(known);
+                places_.push_back({std::move(known), plans.size() - 1, plan.channels.size() - 1});
             }
         }
+        for (const std::string& name : image_.channels)
+            if (!replace_.contains(name)) targets_[targetOf(name)] = name;
+        for (const Place& place : places_)
+            takeFor(place.known, plans[place.part].channels[place.channel], plans[place.part]);
         for (const auto& [from, to] : replace_)
             if (image_.channel(from) >= 0 && !report_.replaced.contains(to))
-                throw Error(path_,
-                            "expected a channel " + to + " to put " + from + " into, found " + listed(names));
-        if (main_ < 0) throw Error(path_, "expected a channel for R, found " + listed(names));
+                throw Error(
+                    path_, "expected a channel " + to + " to put " + from + " into, found " + listed(names_));
+        if (main_ < 0) throw Error(path_, "expected a channel for R, found " + listed(names_));
         addTo(plans[static_cast<std::size_t>(main_)]);
         for (PartPlan& plan : plans)
             if (plan.touched) check(plan);
@@ -164,36 +172,54 @@ class Planner {
     }
 
   private:
+    struct Place {
+        std::string known;
+        std::size_t part, channel;
+    };
+
+    bool isFor(const std::string& known, const std::string& channel) const {
+        const auto found = replace_.find(channel);
+        return found != replace_.end() && found->second == known && image_.channel(channel) >= 0;
+    }
+
+    // Where a channel of the image goes that no entry says: beside R's layer, where the file has it or has
+    // it nowhere.
+    std::string targetOf(const std::string& name) const {
+        // Blender takes no channel without a layer's name for a pass.
+        const bool bare = !prefix_.empty() && layerOf(name).empty();
+        const std::string beside = prefix_ + name + (bare ? ".V" : "");
+        if (name.starts_with(prefix_) || image_.channel(beside) >= 0) return name;
+        return contains(names_, beside) || !contains(names_, name) ? beside : name;
+    }
+
     // The image's channel that replaces `known`, if any. Of luminance, which all colours are taken from, the
     // last in order, R: they are equal.
-    void takeFor(const std::string& known, Channel& channel, PartPlan& plan, int number) {
-        for (const auto& [from, to] : replace_) {
-            if (to != known || image_.channel(from) < 0) continue;
+    void takeFor(const std::string& known, Channel& channel, PartPlan& plan) {
+        const auto take = [&](const std::string& from) {
             channel.source = image_.channel(from);
             plan.touched = true;
             report_.replaced[known] = from;
-            if (from == "R") main_ = number;
-        }
+        };
+        for (const auto& [from, to] : replace_)
+            if (to == known && image_.channel(from) >= 0) take(from);
         if (report_.replaced.contains(known)) return;
-        if (replace_.contains(known) || image_.channel(known) < 0) return;
-        channel.source = image_.channel(known);
-        plan.touched = true;
-        report_.replaced[known] = known;
+        if (const auto found = targets_.find(known); found != targets_.end()) take(found->second);
     }
 
     // Channels of the image that the file has not: to the part that has R.
     void addTo(PartPlan& plan) {
-        for (std::size_t i = 0; i < image_.channels.size(); ++i) {
-            const std::string& name = image_.channels[i];
-            if (replace_.contains(name) || report_.replaced.contains(name)) continue;
-            const auto same = std::find_if(plan.channels.begin(), plan.channels.end(),
-                                           [&](const Channel& channel) { return channel.name == name; });
+        for (const auto& [name, from] : targets_) {
+            if (report_.replaced.contains(name)) continue;
+            const int source = image_.channel(from);
+            const auto same =
+                std::find_if(plan.channels.begin(), plan.channels.end(),
+                             [&, &own = name](const Channel& channel) { return channel.name == own; });
             if (same != plan.channels.end()) {
-                same->source = static_cast<int>(i);
-                report_.replaced[name] = name;
+                same->source = source;
+                report_.replaced[name] = from;
                 continue;
             }
-            plan.channels.push_back({name, Imf::FLOAT, false, static_cast<int>(i), {}});
+            plan.channels.push_back({name, Imf::FLOAT, false, source, {}});
             plan.header.channels().insert(name, Imf::Channel(Imf::FLOAT));
             report_.added.push_back(name);
         }
@@ -221,7 +247,11 @@ class Planner {
     const Image& image_;
     const ChannelMap& replace_;
     LayerCopy& report_;
-    int main_ = -1;  // number of the part that has R
+    std::vector<std::string> names_;              // of all channels, as partChannel() calls them
+    std::vector<Place> places_;                   // of each name
+    int main_ = -1;                               // number of the part that has R
+    std::string prefix_;                          // of R's layer there
+    std::map<std::string, std::string> targets_;  // channel of the file -> of the image, where no entry says
 };
 
 void copyRows(Imf::MultiPartInputFile& in, Imf::MultiPartOutputFile& out, int number, PartPlan& plan,
@@ -313,9 +343,10 @@ LayerCopy copyWithLayers(const std::string& from, const std::string& to, const I
     return report;
 }
 
-ChannelMap findRadiance(const std::string& image, const ChannelMap& map) {
+ChannelMap findRadiance(const std::string& image, const ChannelMap& map, const std::string& layer) {
     const FlatImages file({image});
     StackOptions options;
+    options.layer = layer;
     options.map = map;
     ChannelMap found;
     for (const auto& [channel, name] : chooseStackMap(image, file.channels(0), options).map)

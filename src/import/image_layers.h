@@ -27,17 +27,19 @@ struct LayerCopy {
 ///
 /// `replace`: dump channel (as the image calls it: R, G, B, A, a light group's) -> channel of the file, as
 /// FlatImages call them: in parts after the first with the part's name before it. Channels of the image
-/// without an entry replace those of the same name, or are added to the part that has R's, as FLOAT.
-/// `attributes`: texts that the first part's header gets. Memory is some rows of all channels. The file
-/// appears under its name when it is complete. Throws Error when `from` is not such a file, when its data
-/// window is not the image's, a channel is missing, has not a value for each pixel, or has several
-/// resolutions, and when writing fails.
+/// without an entry (stddev.R) belong beside the layer that R is put into: under its layerPrefix(), where
+/// Blender's compositor looks for them (ViewLayer.stddev.R beside ViewLayer.Combined.R; ViewLayer.ao.V for
+/// ao), unless their names begin so already. They replace channels of that name, else of their own, else they
+/// are added to the part that has R's, as FLOAT. `attributes`: texts that the first part's header gets.
+/// Memory is some rows of all channels. The file appears under its name when it is complete. Throws Error
+/// when `from` is not such a file, when its data window is not the image's, a channel is missing, has not a
+/// value for each pixel, or has several resolutions, and when writing fails.
 LayerCopy copyWithLayers(const std::string& from, const std::string& to, const Image& image,
                          const ChannelMap& replace,
                          const std::map<std::string, std::string>& attributes = {});
 
-/// Where a renderer's file has R, G, B (and A), by StackPreset::Auto and `map`, whose other entries are kept.
-/// Throws Error when it cannot be read or has nothing to take as R, G, B.
-ChannelMap findRadiance(const std::string& image, const ChannelMap& map);
+/// Where a renderer's file has R, G, B (and A), by StackPreset::Auto, `layer` (StackOptions) and `map`, whose
+/// other entries are kept. Throws Error when it cannot be read or has nothing to take as R, G, B.
+ChannelMap findRadiance(const std::string& image, const ChannelMap& map, const std::string& layer = {});
 
 }  // namespace vlx

@@ -16,7 +16,7 @@ namespace {
 
 // What a preset knows: layers in the order of preference.
 struct Convention {
-    Names colour, variance, albedo, normal, depth, alpha;
+    Names variance, albedo, normal, depth, alpha;
     std::optional<VarianceMeaning> meaning;
     bool xyz = false;
 };
@@ -25,12 +25,11 @@ Convention conventionOf(MomentPreset preset) {
     using enum VarianceMeaning;
     switch (preset) {
         case MomentPreset::Pbrt:
-            return {{""}, {"Variance"}, {"Albedo"}, {"Ns", "N"}, {}, {}, OfSample, true};
+            return {{"Variance"}, {"Albedo"}, {"Ns", "N"}, {}, {}, OfSample, true};
         case MomentPreset::Tungsten:
-            return {{""}, {"variance"}, {"albedo"}, {"normal", "N"}, {"depth", "Z"}, {"A"}, OfMean, false};
+            return {{"variance"}, {"albedo"}, {"normal", "N"}, {"depth", "Z"}, {"A"}, OfMean, false};
         case MomentPreset::Arnold:
-            return {{"", "RGBA", "beauty"},
-                    {"variance", "RGBA_variance"},
+            return {{"variance", "RGBA_variance"},
                     {"denoise_albedo", "diffuse_albedo", "albedo"},
                     {"N"},
                     {"Z"},
@@ -38,15 +37,18 @@ Convention conventionOf(MomentPreset preset) {
                     OfSample,
                     false};
         case MomentPreset::RenderMan:
-            return {{"", "Ci"},         {"mse"}, {"albedo"}, {"normal", "Nn"}, {"zfiltered", "z"},
-                    {"A", "a", "Ci.A"}, OfMean,  false};
+            return {{"mse"}, {"albedo"}, {"normal", "Nn"}, {"zfiltered", "z"}, {"A", "a", "Ci.A"},
+                    OfMean,  false};
         case MomentPreset::Mitsuba:
-            return {{""}, {}, {}, {}, {}, {"A"}, SecondMoment, true};
+            return {{}, {}, {}, {}, {"A"}, SecondMoment, true};
         default:
-            return {{""},           {"variance", "Variance", "var"},
-                    {"albedo"},     {"N", "normal"},
-                    {"Z", "depth"}, {"A"},
-                    std::nullopt,   false};
+            return {{"variance", "Variance", "var"},
+                    {"albedo"},
+                    {"N", "normal"},
+                    {"Z", "depth"},
+                    {"A"},
+                    std::nullopt,
+                    false};
     }
 }
 
@@ -95,10 +97,12 @@ const char* nameOf(VarianceMeaning meaning) {
     }
 }
 
-ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& convention) {
+ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& convention,
+                     const std::string& layer) {
     ChannelMap map;
     if (preset == MomentPreset::Mitsuba) {
-        const Names nested = nestedIntegrators(names);
+        Names nested = nestedIntegrators(names);
+        if (contains(nested, layer)) nested = {layer};
         const std::string own = nested.empty() ? "" : nested.front() + ".";
         Names albedo, normal;
         for (const auto& prefix : {own, std::string()}) {
@@ -112,7 +116,7 @@ ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& 
             if (name.ends_with(".T") && !name.starts_with("m2_")) map.try_emplace("Z", name);
         Names colours = {""};
         for (const auto& name : nested) colours.push_back(name);
-        enter(map, "", findTriple(names, colours));
+        enter(map, "", layer.empty() ? findTriple(names, colours) : findColour(names, layer));
         if (!nested.empty())
             for (const char* c : {"R", "G", "B"})
                 map[std::string("variance.") + c] = "m2_" + nested.front() + "." +
@@ -120,22 +124,23 @@ ChannelMap presetMap(const Names& names, MomentPreset preset, const Convention& 
                                                      : *c == 'G' ? "Y"
                                                                  : "Z");
     } else {
-        auto colour = findTriple(names, convention.colour);
+        const auto colour = findColour(names, layer);
         auto variance = findTriple(names, convention.variance);
-        if (preset == MomentPreset::Plain && !colour) {
-            colour = findLuminance(names, convention.colour);
-            if (colour && !variance) variance = findLuminance(names, convention.variance);
-        }
-        if (preset == MomentPreset::Plain && !colour && cyclesLayer(names))
-            map = chooseStackMap("", names, {.preset = StackPreset::Cycles}).map;
+        if (colour && colour->front() == colour->back() && !variance)
+            variance = findLuminance(names, convention.variance);
+        if (preset == MomentPreset::Plain && cyclesLayer(names))
+            map = chooseStackMap("", names, {.preset = StackPreset::Cycles, .layer = layer}).map;
         enter(map, "", colour);
         enter(map, "variance", variance);
         enter(map, "albedo", findTriple(names, convention.albedo));
         enter(map, "N", findTriple(names, convention.normal));
         if (const auto depth = findNumber(names, convention.depth)) map["Z"] = *depth;
     }
-    for (const auto& alpha : convention.alpha)
-        if (contains(names, alpha)) map.try_emplace("A", alpha);
+    if (map.contains("R"))
+        if (const auto alpha = findAlpha(names, map["R"])) map.try_emplace("A", *alpha);
+    if (layer.empty())
+        for (const auto& alpha : convention.alpha)
+            if (contains(names, alpha)) map.try_emplace("A", alpha);
     return map;
 }
 
@@ -164,8 +169,10 @@ std::unique_ptr<ImportedSamples> openMoments(const std::string& image, const Mom
         options.preset == MomentPreset::Auto ? recogniseMoments(names) : options.preset;
     const Convention convention = conventionOf(preset);
 
+    if (!options.layer.empty()) namedLayer(image, names, options.layer);
     Origins origins;
-    for (const auto& [channel, name] : presetMap(names, preset, convention)) origins[channel] = {0, name};
+    for (const auto& [channel, name] : presetMap(names, preset, convention, options.layer))
+        origins[channel] = {0, name};
     companions.enterInto(origins, images);
     for (const auto& [channel, name] : options.map) {
         if (channel == "sample.replicate") throw Error(image, "sample.replicate cannot be mapped");

@@ -46,6 +46,7 @@ struct MomentOptions {
     std::optional<bool> xyz;
     double samples = 0;  ///< samples a pixel; 0: the header's, where the meaning needs it
     CompanionImages with;
+    std::string layer = {};  ///< where R, G, B (and A) are, and Cycles' features beside them: findColour()
     ChannelMap map;  ///< entries override the preset's; variance.R from the channel that holds the variance
     /// Further channels or layers of radiance (radianceChannels), kept under their names. They have no
     /// variances: where there are halves, a part of R is scaled as R is, so that parts still add up.

@@ -35,6 +35,7 @@ struct StackOptions {
     std::string renderer = {};  ///< for the header; from the first image's metadata when empty
     DumpCompression compression = DumpCompression::Zips;
     std::string inputs = {};  ///< for the header's kInputsAttribute (base/fingerprint.h)
+    std::string layer = {};   ///< where R, G, B (and A) are, and Cycles' features beside them: findColour()
 };
 
 /// Joins flat images of the same view, rendered with different seeds, into a dump of one sample an image a

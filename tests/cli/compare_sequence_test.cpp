@@ -127,6 +127,26 @@ TEST_F(SequenceTool, FramesCanBeChosen) {
     EXPECT_EQ(sequence({ref_, out_, "--frames", "1"}).out.find("NaN"), std::string::npos);
 }
 
+TEST_F(SequenceTool, FilesOfLayersAreComparedByTheirCombined) {
+    for (int frame = 1; frame <= 3; ++frame) {
+        const std::string number = std::to_string(frame) + ".exr";
+        Image image = readImage(folder_ / ("out_0" + number));
+        image.channels = {"V.Combined.R", "V.Combined.G", "V.Combined.B"};
+        writeImage(folder_ / ("layers_0" + number), image);
+    }
+    const auto run = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> arguments = {ref_, folder_ / "layers_##.exr", "--json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return sequence(arguments);
+    };
+    const ToolRun found = run({});
+    ASSERT_EQ(found.exitCode, 0) << found.err;
+    EXPECT_NEAR(Json::parse(found.out)["sequences"][0]["relmse"]["value"], 0.0625 / 0.26 / 4, 1e-12);
+    const ToolRun none = run({"--layer", "W"});
+    EXPECT_EQ(none.exitCode, 1);
+    EXPECT_NE(none.err.find("found the layers R, G, B, V.Combined"), std::string::npos) << none.err;
+}
+
 TEST_F(SequenceTool, ReportIsOnePage) {
     const std::string page = folder_ / "page.html";
     const ToolRun run = sequence({ref_, out_, "--report", page, "--quiet"});

@@ -226,6 +226,62 @@ TEST_F(CompareTool, LayersAndStandardDeviations) {
     }
 }
 
+/// What Blender writes, kriged: the picture and its error among other layers.
+Image layersOf(const Image& picture) {
+    std::vector<std::string> names;
+    for (const char* layer :
+         {"Composite.Combined", "V.Combined", "V.Depth", "V.key", "V.stddev", "W.Combined"})
+        for (const char* c : {"R", "G", "B"}) names.push_back(std::string(layer) + "." + c);
+    Image image(picture.data, names);
+    for (int row = 0; row < picture.data.height; ++row)
+        for (int col = 0; col < picture.data.width; ++col)
+            for (int i = 0; i < image.channelCount(); ++i)
+                image.at(col, row)[i] =
+                    i / 3 == 4
+                        ? 0.05f
+                        : picture.at(col, row)[i % 3] + 0.1f * static_cast<float>(i / 3 == 1 ? 0 : i / 3 + 1);
+    return image;
+}
+
+TEST_F(CompareTool, BlendersFilesAreComparedByTheirCombined) {
+    const std::string layers = folder_ / "layers.exr", brighter = folder_ / "brighter.exr";
+    Image image = layersOf(reference_);
+    writeImage(layers, image);
+    for (float& pixel : image.pixels) pixel += 0.01f;
+    writeImage(brighter, image);
+    Json json = Json::parse(run({layers, brighter, good_, "--json", "--stddev", "--reference-stddev"}).out);
+    EXPECT_EQ(json["reference"]["channels"], Json({"V.Combined.R", "V.Combined.G", "V.Combined.B"}));
+    for (const Json& of : json["images"]) EXPECT_NEAR(of["metrics"]["rmse"].get<double>(), 0.01, 1e-6);
+    EXPECT_NEAR(json["images"][0]["calibration"]["predicted_rmse"].get<double>(), std::hypot(0.05, 0.06),
+                1e-6);
+    EXPECT_FALSE(json["images"][1].contains("calibration"));
+
+    json = Json::parse(run({ref_, layers, "--json", "--layer", "W"}).out);
+    EXPECT_EQ(json["images"][0]["channels"], Json({"W.Combined.R", "W.Combined.G", "W.Combined.B"}));
+    EXPECT_NEAR(json["images"][0]["metrics"]["rmse"].get<double>(), 0.6, 1e-6);
+    json = Json::parse(run({ref_, layers, "--json", "--layer", "V.key"}).out);
+    EXPECT_NEAR(json["images"][0]["metrics"]["rmse"].get<double>(), 0.4, 1e-6);
+}
+
+TEST_F(CompareTool, WhereNothingIsFoundTheLayersAreListed) {
+    writeImage(folder_ / "layers.exr", layersOf(reference_));
+    const ToolRun none = run({ref_, folder_ / "layers.exr", "--layer", "X"});
+    EXPECT_EQ(none.exitCode, 1);
+    EXPECT_NE(
+        none.err.find("found the layers R, G, B, Composite.Combined, V.Combined, V.Depth, V.key, V.stddev, "
+                      "W.Combined"),
+        std::string::npos)
+        << none.err;
+    EXPECT_EQ(none.err.find("V.key.R"), std::string::npos);
+    Image passes(reference_.data, {"V.Normal.X", "V.Normal.Y", "V.Normal.Z", "V.Depth.Z"});
+    writeImage(folder_ / "passes.exr", passes);
+    const ToolRun missing = run({ref_, folder_ / "passes.exr"});
+    EXPECT_EQ(missing.exitCode, 1);
+    EXPECT_NE(missing.err.find("passes.exr: expected channels R, G, B"), std::string::npos) << missing.err;
+    EXPECT_NE(missing.err.find("(--layer NAME names one), found the layers V.Normal, V.Depth"),
+              std::string::npos);
+}
+
 TEST_F(CompareTool, BadUsageIsTwoAndEachOptionMissesItsValue) {
     for (const char* option :
          {"--layer", "--pictures", "--crop", "--exposure", "--fail-above", "--fail-below", "--threads"}) {

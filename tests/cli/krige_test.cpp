@@ -313,14 +313,57 @@ TEST(VlxKrigeFlat, ResultsGoIntoACopyOfATemplate) {
     const Image out = readImage(folder / "out.exr"), plain = readImage(folder / "plain.exr");
     EXPECT_EQ(out.display, beauty.display);
     EXPECT_EQ(out.channelCount(), 9);
+    EXPECT_EQ(out.channel("stddev.R"), -1) << "not where Blender's compositor does not look";
     for (int row = 0; row < 37; ++row)
         for (int col = 0; col < 40; ++col) {
             const float *is = out.at(col, row), *result = plain.at(col, row);
             ASSERT_EQ(is[out.channel("V.Id.X")], beauty.at(col, row)[4]);
-            ASSERT_EQ(is[out.channel("stddev.B")], result[plain.channel("stddev.B")]);
+            ASSERT_EQ(is[out.channel("V.stddev.B")], result[plain.channel("stddev.B")]);
             for (const auto& [layer, channel] : {std::pair{"V.Combined.B", "B"}, {"key.G", "key.G"}})
                 ASSERT_NEAR(is[out.channel(layer)], result[plain.channel(channel)], 2e-3);
         }
+}
+
+TEST(VlxKrigeFlat, TheLayerCanBeChosen) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out.exr";
+    std::vector<std::string> more;
+    for (const char* layer : {"V.Combined", "W.Combined"})
+        for (const char* c : {"R", "G", "B"}) more.push_back(std::string(layer) + "." + c);
+    writeFlat(folder / "in.exr", more);
+    const Image in = readImage(folder / "in.exr");
+    const auto changed = [&](const Image& image, const char* channel) {
+        int count = 0;
+        for (int i = 0; i < kFlatWindow.width * kFlatWindow.height; ++i)
+            count += image.at(i % 40, i / 40)[image.channel(channel)] !=
+                     in.at(i % 40, i / 40)[in.channel(channel)];
+        return count;
+    };
+    for (const std::string& input : {std::string("in"), std::string("dump")}) {
+        if (input == "dump")
+            ASSERT_EQ(
+                runTool("vlx-pack", {"moments", folder / "in.exr", "-o", folder / "dump.exr", "--layer", "W"})
+                    .exitCode,
+                0);
+        std::vector<std::string> arguments = {
+            folder / (input + ".exr"), "-o", out, "--layer", "W", "--overwrite"};
+        if (input == "dump") arguments.insert(arguments.end(), {"--template", folder / "in.exr"});
+        const ToolRun run = krige(arguments);
+        ASSERT_EQ(run.exitCode, 0) << run.err;
+        const Image image = readImage(out);
+        EXPECT_GT(changed(image, "W.Combined.G"), 500) << input;
+        for (const char* same : {"V.Combined.G", "key.G", "G"})
+            EXPECT_EQ(changed(image, same), 0) << input << same;
+        EXPECT_GE(image.channel("W.stddev.R"), 0);
+        EXPECT_EQ(image.channelCount(), in.channelCount() + 3);
+    }
+    const ToolRun none = krige({folder / "in.exr", "-o", folder / "none.exr", "--layer", "X"});
+    EXPECT_EQ(none.exitCode, 1);
+    EXPECT_NE(none.err.find("found the layers R, G, B, A, mse, key, fill, V.Combined, W.Combined"),
+              std::string::npos)
+        << none.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "none.exr"));
+    EXPECT_EQ(krige({kDump, "-o", folder / "none.exr", "--layer", "W"}).exitCode, 2);
 }
 
 TEST(VlxKrigeFlat, WhatDoesNotFitIsTold) {

@@ -231,31 +231,6 @@ TEST(ToneMapped, IsGammaInsideZeroToOne) {
     EXPECT_NEAR(toneMapped(std::pow(0.5, 2.2)), 0.5, 1e-15);
 }
 
-TEST(ColourOf, FindsChannelsByNameInAnyOrderAndLayer) {
-    Image image(Window{2, 3, 1, 1}, {"A", "B", "G", "R", "light.B", "light.G", "light.R"});
-    image.pixels = {9, 3, 2, 1, 6, 5, 4};
-    EXPECT_EQ(colourOf(image, "a").pixels, (std::vector<float>{1, 2, 3}));
-    EXPECT_EQ(colourOf(image, "a", "light").pixels, (std::vector<float>{4, 5, 6}));
-    EXPECT_EQ(colourOf(image, "a", "absent").pixels, (std::vector<float>{1, 2, 3}));
-    EXPECT_EQ(colourOf(image, "a").data, image.data);
-    EXPECT_TRUE(hasLayer(image, "light"));
-    EXPECT_FALSE(hasLayer(image, "ligh"));
-}
-
-TEST(ColourOf, GreyIsThreeEqualChannelsAndAnythingElseAnError) {
-    Image grey(Window{0, 0, 1, 1}, {"Y"});
-    grey.pixels = {0.5f};
-    EXPECT_EQ(colourOf(grey, "a").pixels, (std::vector<float>{0.5f, 0.5f, 0.5f}));
-    const Image other(Window{0, 0, 1, 1}, {"N.X", "N.Y"});
-    try {
-        colourOf(other, "normals.exr");
-        FAIL();
-    } catch (const Error& error) {
-        EXPECT_NE(std::string(error.what()).find("normals.exr"), std::string::npos);
-        EXPECT_NE(std::string(error.what()).find("N.X, N.Y"), std::string::npos);
-    }
-}
-
 TEST(Calibration, NormalErrorsOfTheStatedSizeAreCovered) {
     const int side = 200;
     Image reference = noise(side, side, 10), image = reference, stddev = reference;

@@ -151,6 +151,105 @@ TEST(ImageLayers, RadianceIsFoundAsAStackFindsIt) {
         (ChannelMap{{"R", "V.Combined.R"}, {"G", "V.Mist.Z"}, {"B", "V.Combined.B"}, {"A", "V.Combined.A"}}));
 }
 
+LayerPart partOf(const std::string& name, const std::vector<std::string>& channels) {
+    LayerPart part = rendererParts().front();
+    part.name = name;
+    part.channels.clear();
+    for (const std::string& channel : channels) part.channels.push_back({channel});
+    return part;
+}
+
+std::vector<std::string> namesIn(const std::string& path, std::size_t part = 0) {
+    std::vector<std::string> names;
+    const std::vector<ReadPart> parts = readLayers(path);
+    for (const auto& [name, bytes] : parts[part].channels) names.push_back(name);
+    return names;
+}
+
+// Blender's compositor shows passes of the layer that it shows, none beside it.
+TEST(ImageLayers, WhatIsNewGoesBesideTheLayerThatIsReplaced) {
+    const TemporaryFolder folder;
+    const std::string in = folder / "in.exr", once = folder / "once.exr", twice = folder / "twice.exr";
+    writeLayers(in, {partOf("main", {"V.Combined.R", "V.key.R", "rim.R", "W.Combined.R"})});
+    const std::vector<std::string> channels = {"R", "rim.R", "V.key.R", "stddev.R", "fill.R", "ao"};
+    const Image image = imageOf(kData, channels, denoised),
+                other = imageOf(kData, channels, [](int c, int x, int y) { return -denoised(c, x, y); });
+    const LayerCopy copy = copyWithLayers(in, once, image, {{"R", "V.Combined.R"}});
+    EXPECT_EQ(copy.replaced, (ChannelMap{{"V.Combined.R", "R"}, {"V.key.R", "V.key.R"}, {"rim.R", "rim.R"}}));
+    EXPECT_EQ(copy.added, (std::vector<std::string>{"V.ao.V", "V.fill.R", "V.stddev.R"}));
+
+    // Once more: what was added is replaced.
+    const LayerCopy again = copyWithLayers(once, twice, other, {{"R", "V.Combined.R"}});
+    EXPECT_TRUE(again.added.empty());
+    EXPECT_EQ(again.replaced.at("V.stddev.R"), "stddev.R");
+    EXPECT_EQ(namesIn(twice), namesIn(once));
+    const Image first = readImage(once), second = readImage(twice);
+    EXPECT_EQ(first.at(3, 4)[first.channel("V.stddev.R")], denoised(3, kData.x + 3, kData.y + 4));
+    EXPECT_EQ(second.at(3, 4)[second.channel("V.stddev.R")], -denoised(3, kData.x + 3, kData.y + 4));
+
+    // The other view layer has an error of its own; what has no layer above keeps its name.
+    EXPECT_EQ(copyWithLayers(once, twice, image, {{"R", "W.Combined.R"}}).added,
+              (std::vector<std::string>{"W.ao.V", "W.fill.R", "W.stddev.R"}));
+    EXPECT_EQ(copyWithLayers(in, twice, image, {{"R", "rim.R"}}).added,
+              (std::vector<std::string>{"ao", "fill.R", "stddev.R"}));
+}
+
+TEST(ImageLayers, PartsOfTheirOwnGetTheErrorOfTheirLayer) {
+    const TemporaryFolder folder;
+    const std::string in = folder / "in.exr", out = folder / "out.exr";
+    writeLayers(
+        in, {partOf("V.Depth", {"V.Depth.Z"}), partOf("V.Combined", {"V.Combined.R"}), partOf("raw", {"R"})});
+    const Image image = imageOf(kData, {"R", "stddev.R"}, denoised);
+    copyWithLayers(in, out, image, {{"R", "V.Combined.R"}});
+    EXPECT_EQ(namesIn(out, 1), (std::vector<std::string>{"V.Combined.R", "V.stddev.R"}));
+    EXPECT_TRUE(copyWithLayers(out, folder / "twice.exr", image, {{"R", "V.Combined.R"}}).added.empty());
+    copyWithLayers(in, out, image, {{"R", "raw.R"}});
+    EXPECT_EQ(namesIn(out, 2), (std::vector<std::string>{"R", "stddev.R"}));
+    const Image read = readImage(out, [](const std::vector<std::string>& names) {
+        EXPECT_EQ(names, (std::vector<std::string>{"V.Depth.Z", "V.Combined.R", "raw.R", "raw.stddev.R"}));
+        return std::vector<std::string>{"raw.stddev.R", "V.Combined.R", "raw.R"};
+    });
+    const std::vector<std::string> wanted = {"raw.stddev.R", "V.Combined.R", "raw.R"};
+    EXPECT_EQ(read.channels, wanted);
+    const int x = kData.x + 7, y = kData.y + 140;
+    const float* pixel = read.at(7, 140);
+    EXPECT_EQ(pixel[0], denoised(1, x, y));
+    EXPECT_EQ(pixel[1], layerValue("V.Combined.R", x, y));
+    EXPECT_EQ(pixel[2], denoised(0, x, y));
+}
+
+TEST(ImageLayers, ALayerIsChosenByName) {
+    const TemporaryFolder folder;
+    const std::string in = folder / "in.exr";
+    LayerPart part = partOf("", {});
+    for (const char* layer : {"V.Combined", "V.Combined_key", "W.Combined", "W.Denoising Albedo"})
+        for (const char* c : {"R", "G", "B", "A"}) part.channels.push_back({std::string(layer) + "." + c});
+    std::erase_if(part.channels, [](const auto& channel) {
+        return channel.name == "V.Combined_key.A" || channel.name == "W.Denoising Albedo.A";
+    });
+    writeLayers(in, {part});
+    EXPECT_EQ(
+        findRadiance(in, {}, "W"),
+        (ChannelMap{
+            {"R", "W.Combined.R"}, {"G", "W.Combined.G"}, {"B", "W.Combined.B"}, {"A", "W.Combined.A"}}));
+    EXPECT_EQ(findRadiance(in, {}, "V.Combined_key"),
+              (ChannelMap{{"R", "V.Combined_key.R"}, {"G", "V.Combined_key.G"}, {"B", "V.Combined_key.B"}}));
+    EXPECT_NE(errorOf([&] {
+                  findRadiance(in, {}, "Z");
+              }).find("found the layers V.Combined, V.Combined_key, W.Combined, W.Denoising Albedo"),
+              std::string::npos);
+    // Features are those of the same view layer.
+    MomentOptions options;
+    options.layer = "W";
+    options.meaning = VarianceMeaning::OfMean;
+    options.map = {
+        {"variance.R", "V.Combined.R"}, {"variance.G", "V.Combined.R"}, {"variance.B", "V.Combined.R"}};
+    const auto mapped = openMoments(in, options)->report().mapped;
+    EXPECT_EQ(mapped.at("R"), "W.Combined.R");
+    EXPECT_EQ(mapped.at("A"), "W.Combined.A");
+    EXPECT_EQ(mapped.at("albedo.G"), "W.Denoising Albedo.G");
+}
+
 // Channels of later parts go by their part's name: a variance in a part of its own.
 TEST(ImageLayers, MomentsMayLieInSeveralParts) {
     const TemporaryFolder folder;

@@ -258,11 +258,12 @@ TEST(Stack, MisfitsAreErrorsThatNameTheFile) {
     EXPECT_NE(message({}), "");
 
     const auto plain = writeImages(folder, 2, {"R", "G", "B"});
-    EXPECT_NE(
-        errorOf([&] {
-            stackImages(plain, folder / "d.exr", {StackPreset::Cycles, {}, {}, {}});
-        }).find("expected a channel L.Combined.R of some layer L, as --preset cycles says, found R, G, B"),
-        std::string::npos);
+    EXPECT_NE(errorOf([&] {
+                  stackImages(plain, folder / "d.exr", {StackPreset::Cycles, {}, {}, {}});
+              })
+                  .find("expected a channel L.Combined.R of some layer L, as --preset cycles says, found the "
+                        "layers R, G, B"),
+              std::string::npos);
 }
 
 TEST(Stack, ADumpIsNotAnImage) {

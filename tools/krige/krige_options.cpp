@@ -32,7 +32,7 @@ const std::vector<OptionUse>& usesByInput() {
         {{"--preset", "--variance-is", "--variance-of", "--variance", "--albedo", "--normal", "--depth",
           "--samples", "--drop-layers"},
          {"a flat image"}},
-        {{"--map"}, {"a flat image", "--template"}},
+        {{"--map", "--layer"}, {"a flat image", "--template"}},
         {{"--layers-are-samples", "--positions"}, {"a dump"}}};
     return uses;
 }
@@ -70,9 +70,11 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
         ->required();
     app.add_option(
            "-o,--output", o.image,
-           "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the standard "
+           "OpenEXR image to write: R, G, B, A when the dump has it, and layer stddev (the estimated "
+           "standard "
            "deviation of the error of R, G, B). Of a flat OpenEXR image: a copy with all its layers and "
-           "parts, R, G, B, A and named radiance denoised, stddev added")
+           "parts, R, G, B, A and named radiance denoised, stddev added beside them (ViewLayer.stddev "
+           "beside ViewLayer.Combined)")
         ->required();
     app.add_option(
            "--template", o.layersOf,
@@ -95,11 +97,13 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
               "krige: draft: one model, sparse neighbourhoods, an image without compression; standard: three "
               "models; high: neighbourhoods "
               "twice as dense along each axis");
-    addChoice(app, "--fireflies", o.krige.fireflies,
-              {{"keep", Fireflies::Keep}, {"robust", Fireflies::Robust}, {"clamp", Fireflies::Clamp}},
-              "krige: samples far brighter than all around. keep: unbiased and noisy; robust: the brightest "
-              "sample of 5 x 5 pixels counts as bright as the second; clamp: luminance is cut at --clamp. "
-              "What was removed is reported");
+    addChoice(
+        app, "--fireflies", o.krige.fireflies,
+        {{"keep", Fireflies::Keep}, {"robust", Fireflies::Robust}, {"clamp", Fireflies::Clamp}},
+        "krige: samples far brighter than all around. keep: all count as they are, which is noisy, and "
+        "still not unbiased: the estimate smooths; robust: the brightest sample of 5 x 5 pixels counts "
+        "as bright as the second, and what light that costs is given back around it; clamp: luminance is "
+        "cut at --clamp, which darkens. What was removed is reported");
     app.add_option("--clamp", o.krige.clamp, "krige: greatest luminance of a sample with --fireflies clamp")
         ->check(finitePositive())
         ->capture_default_str();
@@ -113,7 +117,7 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
     app.add_option(
         "--radiance", o.krige.radiance,
         "krige: a further channel or layer to estimate with the same weights as R, G, B (a light group): "
-        "parts still add up; repeatable");
+        "parts of R, G, B still add up to them, but for rounding; repeatable");
     app.add_option("--scale", o.krige.scale,
                    "krige: pixels of the image along each axis for one of the dump; needs sample positions")
         ->check(CLI::Range(1, 4))
@@ -197,7 +201,7 @@ void bindOptions(CLI::App& app, KrigeOptions& o) {
     app.add_option("--threads", o.threads, "0: all processors. The result does not depend on it")
         ->check(CLI::Range(0, 1024))
         ->capture_default_str();
-    o.moments.bind(app, "Flat images (--map also says where --template has R, G, B)");
+    o.moments.bind(app, "Flat images (--layer and --map also say where --template has R, G, B)");
     app.footer(
         "Examples:\n"
         "  vlx-krige samples.exr -o image.exr\n"

@@ -4,9 +4,9 @@
 
 #include "frames.h"
 #include "opinion/denoiser.h"
+#include "variolux/base/channel_names.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
-#include "variolux/dump/format.h"
 
 namespace vlx {
 
@@ -55,15 +55,17 @@ GivenImages givenImages(const OpinionOptions& o) {
 
 Image imageOf(const std::string& name, const Window& window) {
     const FileLayer of = splitLayer(name);
-    Image image = readImage(of.file);
-    if (!of.layer.empty()) {
-        const auto channels = layerTriple(image.channels, of.layer);
-        if (!channels)
+    Image image = readImage(of.file, [&](const std::vector<std::string>& names) {
+        const auto colour = findColour(names, of.layer);
+        if (!colour || colour->front() == colour->back())
             throw Error(of.file,
-                        "expected a layer '" + of.layer + "' of R, G and B, found none of that name");
-        image = image.select({channels->begin(), channels->end()});
-        image.channels = {"R", "G", "B"};
-    }
+                        (of.layer.empty() ? std::string("expected channels R, G and B of another denoiser "
+                                                        "(FILE:LAYER names a layer)")
+                                          : "expected a layer '" + of.layer + "' of R, G and B") +
+                            ", found the layers " + listedLayers(names));
+        return std::vector<std::string>(colour->begin(), colour->end());
+    });
+    image.channels = {"R", "G", "B"};
     return checkedOpinion(std::move(image), of.file, window);
 }
 
@@ -78,7 +80,8 @@ void OpinionOptions::bind(CLI::App& app) {
     auto* given =
         app.add_option("--denoised", denoised,
                        "krige: combine the estimate with this image, which another denoiser made of the "
-                       "same samples: R, G, B of a file, or of a layer of it. What samples show to be "
+                       "same samples: R, G, B of a file (of Blender's, Combined), or a layer of it. What "
+                       "samples show to be "
                        "wrong in it does not count")
             ->option_text("IMAGE[:LAYER]")
             ->check(filled);

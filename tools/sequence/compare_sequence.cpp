@@ -16,9 +16,9 @@
 #include "sequence/sequence_report.h"
 #include "tool_main.h"
 #include "variolux/base/error.h"
-#include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/parallel.h"
+#include "variolux/compare/colour_image.h"
 #include "variolux/compare/report.h"
 
 namespace vlx {
@@ -82,9 +82,12 @@ struct SequenceCommand {
         app.add_option("--frames", frameList,
                        "Frames to compare, for example 1-100 or 1-3,7,10-20x5 (default: those of REFERENCE)")
             ->option_text("LIST");
-        app.add_option("--layer", layer,
-                       "Compare the channels NAME.R, NAME.G, NAME.B of every file that has them, and R, G, B "
-                       "of the others")
+        app.add_option(
+               "--layer", layer,
+               "Compare the layer of this name (ViewLayer.Combined_key), or Combined of the view layer of "
+               "this "
+               "name (ViewLayer2), of every file that has it, and of the others what is compared without: R, "
+               "G, B, or the layer where renderers keep their picture")
             ->option_text("NAME");
         app.add_option(
                "--motion", motion,
@@ -177,11 +180,11 @@ Examples:
         const Progress progress = bar;
         std::vector<SequenceComparison> comparisons(images.size());
         std::optional<SequencePage> shown;
-        bool layerFound = layer.empty();
+        LayerSearch search(layer);
         const auto read = [&](const std::string& path) {
-            const Image image = readImage(path);
-            layerFound = layerFound || hasLayer(image, layer);
-            return colourOf(image, path, layer);
+            ColourImage image = readColour(path, layer);
+            search.add(image);
+            return std::move(image.colour);
         };
         for (std::size_t i = 0; i < report.frames.size(); ++i) {
             const int frame = report.frames[i];
@@ -202,7 +205,7 @@ Examples:
             if (progress)
                 progress(static_cast<std::int64_t>(i) + 1, static_cast<std::int64_t>(report.frames.size()));
         }
-        if (!layerFound) throw Error(layer, "expected a layer of this name in at least one file, found none");
+        search.check();
         for (std::size_t k = 0; k < images.size(); ++k) report.sequences[k].errors = comparisons[k].errors();
         return shown ? shown->html(report) : "";
     }

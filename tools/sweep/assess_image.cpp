@@ -7,7 +7,7 @@
 #include "process/child_process.h"
 #include "sweep/sweep_command.h"
 #include "variolux/base/error.h"
-#include "variolux/base/image_io.h"
+#include "variolux/compare/colour_image.h"
 #include "variolux/compare/reliability.h"
 
 namespace vlx {
@@ -62,7 +62,7 @@ std::map<std::string, double> assessedErrors(const SweepPlan& plan, const std::s
     }
     const auto report = reportOf(run, "vlx-krige --assess");
     const PredictedError predicted =
-        predictedError(colourOf(readImage(image), image), colourOf(readImage(map), map, kStddev), image);
+        predictedError(readColour(image).colour, readColour(map, "stddev").colour, image);
     return {{"predicted_relmse", report.at("relMse")},
             {"assessed_low", report.at("low")},
             {"assessed_high", report.at("high")},

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "sweep/assess_image.h"
-#include "variolux/base/image_io.h"
+#include "variolux/compare/colour_image.h"
 #include "variolux/compare/sequence.h"
 
 namespace vlx {
@@ -39,10 +39,9 @@ void judgeImages(const SweepPlan& plan, const std::string& command, const std::s
     bool mapped = true, referenceMapped = true;
     for (std::size_t i = 0; i < images.size(); ++i) {
         const std::string& path = images[i];
-        const Image made = readImage(path);
-        const Image colour = colourOf(made, path);
-        std::optional<Image> stddev;
-        if (hasLayer(made, kStddev)) stddev = colourOf(made, path, kStddev);
+        const ColourImage made = readColour(path, {}, true);
+        const Image& colour = made.colour;
+        const std::optional<Image>& stddev = made.stddev;
         mapped = mapped && stddev;
         if (!plan.references.empty()) {
             const ReferenceImage& reference = plan.references[i];

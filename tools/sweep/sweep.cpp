@@ -19,6 +19,7 @@
 #include "variolux/base/image_io.h"
 #include "variolux/base/output_file.h"
 #include "variolux/base/text.h"
+#include "variolux/compare/colour_image.h"
 #include "variolux/compare/metrics.h"
 
 namespace vlx {
@@ -216,7 +217,7 @@ class Runner {
         const std::string image = scratch() + "/" + plan_.imageName(record.key + ".image");
         if (record.command.find("{sigma}") != std::string::npos) {
             const std::size_t middle = plan_.frames.size() / 2;
-            const double sigma = bestSigma(colourOf(readImage(plan_.files(dump)[middle]), dump),
+            const double sigma = bestSigma(readColour(plan_.files(dump)[middle]).colour,
                                            plan_.references[middle].colour, plan_.options.input);
             record.values["sigma"] = sigma;
             record.command = filled(record.command, {{"sigma", numberText(sigma)}});
@@ -314,15 +315,12 @@ class Runner {
             record.reliability.reset();
             record.file = "images/" + record.key + ".exr.json";
             const std::string path = plan_.options.folder + "/" + image.file;
-            const Image made = readImage(path);
-            const Image colour = colourOf(made, path);
-            std::optional<Image> stddev;
-            if (hasLayer(made, kStddev)) stddev = colourOf(made, path, kStddev);
+            const ColourImage made = readColour(path, {}, true);
             const ReferenceImage* reference = plan_.references.empty() ? nullptr : &plan_.references.front();
             std::string command =
                 plan_.methodCommand(*task.method, image.sampling, image.seed) + " --diagnostics";
-            for (const auto& [x, y] :
-                 inspectedPixels(errorImage(colour, stddev, reference), plan_.options.inspectedRegions))
+            for (const auto& [x, y] : inspectedPixels(errorImage(made.colour, made.stddev, reference),
+                                                      plan_.options.inspectedRegions))
                 command += " --inspect " + std::to_string(x) + "," + std::to_string(y);
             const std::string output = scratch() + "/" + record.key + ".exr";
             const ProcessRun run = runCommand(plan_.executable(

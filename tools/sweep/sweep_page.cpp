@@ -8,8 +8,7 @@
 #include "page/page.h"
 #include "sweep/sweep_json.h"
 #include "variolux/base/error.h"
-#include "variolux/base/image_io.h"
-#include "variolux/compare/metrics.h"
+#include "variolux/compare/colour_image.h"
 
 namespace vlx {
 
@@ -31,11 +30,10 @@ Image meanDeviation(const Image& stddev) {
 }
 
 Json imageJson(const std::string& path) {
-    const Image image = readImage(path);
-    const int factor = pageImageFactor(image.data);
-    Json json = pageImage(colourOf(image, path), factor);
-    if (hasLayer(image, "stddev"))
-        json["stddev"] = packedPlanes(meanDeviation(colourOf(image, path, "stddev")), factor);
+    const ColourImage image = readColour(path, {}, true);
+    const int factor = pageImageFactor(image.colour.data);
+    Json json = pageImage(image.colour, factor);
+    if (image.stddev) json["stddev"] = packedPlanes(meanDeviation(*image.stddev), factor);
     return json;
 }
 

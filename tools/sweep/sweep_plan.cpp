@@ -12,6 +12,7 @@
 #include "variolux/base/fingerprint.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/image_io.h"
+#include "variolux/compare/colour_image.h"
 #include "variolux/compare/metrics.h"
 
 namespace vlx {
@@ -35,9 +36,8 @@ std::vector<int> sortedFrames(const std::string& text) {
 
 void readReference(SweepPlan& plan) {
     for (const std::string& path : plan.files(plan.options.reference)) {
-        const Image image = readImage(path);
-        ReferenceImage& reference = plan.references.emplace_back(ReferenceImage{colourOf(image, path), {}});
-        if (hasLayer(image, kStddev)) reference.stddev = colourOf(image, path, kStddev);
+        ColourImage image = readColour(path, {}, true);
+        plan.references.push_back({std::move(image.colour), std::move(image.stddev)});
         plan.referenceIdentity += fileFingerprint(path);
     }
 }

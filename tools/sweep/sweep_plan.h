@@ -13,7 +13,6 @@
 namespace vlx {
 
 /// The layer of reconstructed images that holds the standard deviation of their error.
-inline constexpr const char* kStddev = "stddev";
 
 /// What a sweep is going to run, known before anything is run.
 struct SweepPlan {

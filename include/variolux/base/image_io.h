@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,6 +16,14 @@ namespace vlx {
 /// Throws Error when the file is missing, unreadable, truncated, deep only, empty, or larger than 2^31
 /// values.
 Image readImage(const std::string& path);
+
+/// Which channels of an image to read, of those that it has.
+using ChannelChoice = std::function<std::vector<std::string>(const std::vector<std::string>&)>;
+
+/// Reads the channels that `choose` takes, in its order, of all flat parts that have the data window of the
+/// first flat one: channels of later parts are called as partChannel() says (base/channel_names.h). Memory is
+/// that of the channels taken. Throws Error as readImage() does, and when there is no such channel.
+Image readImage(const std::string& path, const ChannelChoice& choose);
 
 struct ImageWriteOptions {
     bool half = false;                              ///< EXR only: 16-bit channels instead of 32-bit

@@ -60,20 +60,7 @@ struct Comparison {
     double operator[](Metric metric) const { return values[static_cast<std::size_t>(metric)]; }
 };
 
-/// The names of the channels that hold an image's red, green and blue: `layer`.R, .G, .B when a layer is
-/// given and the image has it, else R, G, B, else Y (grey: the same channel three times), else the one
-/// channel of a one-channel image. `path` names the image in errors. Throws Error, listing the channels there
-/// are, when there is no colour.
-std::array<std::string, 3> colourChannels(const Image& image, const std::string& path,
-                                          const std::string& layer = {});
-
-/// Those channels as an image of three, R, G, B, with the same windows. Same errors.
-Image colourOf(const Image& image, const std::string& path, const std::string& layer = {});
-
-/// Whether an image has the channels `layer`.R, .G and .B.
-bool hasLayer(const Image& image, std::string_view layer);
-
-/// Every metric of `image` against `reference`, both as colourOf returns them.
+/// Every metric of `image` against `reference`, both R, G, B as readColour() returns them.
 ///
 /// RelMseTrimmed: a pixel's value is the mean over its channels of (x - r)^2 / (r^2 + 0.01); the
 /// ceil(n / 1000) highest are left out, and the mean is over those that stay. Told beside RelMse, it says how
@@ -98,9 +85,8 @@ struct Calibration {
     std::int64_t excluded = 0;  ///< values left out: x, r or s not finite, or s negative
 };
 
-/// Coverage of the error bars x +- s, s = `stddev` (a colour image of standard deviations; see colourOf with
-/// layer "stddev"). When the reference is itself uncertain by `referenceStddev`, s^2 is the sum of both
-/// variances. Throws Error when data windows differ.
+/// Coverage of the error bars x +- s, s = `stddev` (ColourImage::stddev). When the reference is itself
+/// uncertain by `referenceStddev`, s^2 is the sum of both variances. Throws Error when data windows differ.
 Calibration checkCalibration(const Image& reference, const Image& image, const Image& stddev,
                              const std::optional<Image>& referenceStddev = {}, const std::string& path = {});
 

@@ -7,7 +7,7 @@
 
 namespace vlx {
 
-/// A colour image (see colourOf) and how pictures caption it.
+/// A colour image (see readColour) and how pictures caption it.
 struct CaptionedImage {
     std::string name;
     std::string note;  ///< a second line, for example a metric; may be empty

@@ -18,7 +18,7 @@ struct PredictedError {
     std::int64_t excluded = 0;  ///< x or s not finite, or s negative
 };
 
-/// Throws Error when the data windows differ. Both as colourOf returns them.
+/// Throws Error when the data windows differ. Both as readColour returns them.
 PredictedError predictedError(const Image& image, const Image& stddev, const std::string& path = {});
 
 /// One group of values with similar predicted errors.

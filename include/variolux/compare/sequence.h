@@ -44,7 +44,7 @@ struct SequenceErrors {
 class SequenceComparison {
   public:
     /// The next frame, with a higher number than the one before: it flickers where the number is the next
-    /// one. Images as colourOf() returns them. `motion`: an image of two channels, how far from a pixel, to
+    /// one. Images as readColour() returns them. `motion`: an image of two channels, how far from a pixel, to
     /// the right and down, its point was in the frame before; not finite where that is not known; nullptr:
     /// nowhere. `path` names the image in errors. Throws Error, naming it, when its data window is not the
     /// reference's or those of the frame before.

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -67,13 +66,8 @@ std::optional<std::uint32_t> replicateNumber(float value);
 /// Lets `header` say what the dump is made of (kInputsAttribute of base/fingerprint.h): nothing when empty.
 void setInputs(DumpHeader& header, const std::string& inputs);
 
-/// The three colours, or coordinates, of a layer among `names`: layer.R .G .B, or .r .g .b, .X .Y .Z,
-/// .x .y .z; without a layer's name and its dot when `layer` is empty.
-std::optional<std::array<std::string, 3>> layerTriple(const std::vector<std::string>& names,
-                                                      const std::string& layer);
-
-/// Channels that `name` stands for among `names`: the channel of this name, or the layerTriple() of this
-/// name. Empty when there are none.
+/// Channels that `name` stands for among `names`: the channel of this name, or the layerTriple()
+/// (base/channel_names.h) of this name. Empty when there are none.
 std::vector<std::string> radianceChannels(const std::vector<std::string>& names, const std::string& name);
 
 /// Something a dump lacks, and what that costs the reconstruction.
