@@ -221,9 +221,11 @@ TEST_F(DriftKriging, NoSeamsAtTilesAndCentres) {
 
 TEST_F(DriftKriging, PartsOfTheLightAddUp) {
     Picture picture;
+    // Lines that no feature knows, whose light is given back: also to parts that noise makes negative.
+    picture.truth = [](int x, int y) { return (x % 16 == 0 ? 4 : 0.5) + 0.004 * y; };
     SampleBand band = picture.samples();
     std::mt19937 random(9);
-    std::uniform_real_distribution<float> share(0, 1);
+    std::uniform_real_distribution<float> share(-1.5f, 1.5f);
     band.channels.insert(band.channels.end(), {"key.R", "fill.R"});
     band.values.resize(band.channels.size());
     for (const float r : band.values[0]) {
@@ -240,7 +242,7 @@ TEST_F(DriftKriging, PartsOfTheLightAddUp) {
         for (int row = 0; row < image.data.height; ++row)
             for (int col = 0; col < image.data.width; ++col) {
                 const float* pixel = image.at(col, row);
-                ASSERT_NEAR(pixel[key] + pixel[fill], pixel[0], 4e-6) << col << " " << row;
+                ASSERT_NEAR(pixel[key] + pixel[fill], pixel[0], 2e-5) << col << " " << row;
             }
     }
 }

@@ -219,13 +219,13 @@ Finishing::Counts Finishing::outputRow(int y, float* out) const {
         for (int c = 0; c < radiance_; ++c) {
             const double mean = plainMean(data_, planes_, c, x, y);
             double value = clean_.row(c, y)[x];
-            // Light is not negative. Parts of light must add up: they are left as they come.
+            // Light is not negative. Parts of light must add up: negative ones take their share, and stay so.
             if (c == layout_.alpha) {
                 value = coverage(value);
             } else {
                 const int colour = colour_[static_cast<std::size_t>(c)];
                 const double whole = colour < 0 ? light : std::max(0.f, clean_.row(colour, y)[x]);
-                if (whole > 0 && value > 0) value += value * (colour < 0 ? all : moved[colour]) / whole;
+                if (whole > 0) value += value * (colour < 0 ? all : moved[colour]) / whole;
                 if (radiance_ == 3 + (layout_.alpha >= 0) && mean >= 0) value = std::max(0.0, value);
             }
             const double chosen = exact ? mean : value;

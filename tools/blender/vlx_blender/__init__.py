@@ -1,0 +1,1 @@
+"""What vlx-blender consists of. Python's standard library alone."""
