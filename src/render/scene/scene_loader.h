@@ -16,7 +16,7 @@ struct EnvironmentOptions {
 /// What of a file is shown, and how it is meant.
 struct SceneChoices {
     LightUnits lightUnits = LightUnits::Auto;
-    std::string variant;  ///< name or number of a variant of materials; empty: the default
+    std::string variant = {};  ///< name or number of a variant of materials; empty: the default
 };
 
 /// Reads a glTF 2.0 scene (.gltf or .glb). Units become radiometric: intensities of punctual lights W/sr or
