@@ -152,7 +152,7 @@ TEST(Skins, ThatTurnAreFollowedInSteps) {
 
 // A sequence: the right side moves by 0.4 a frame, what lies half way by half of that.
 TEST(Bends, MotionBetweenFramesIsThatOfThePoint) {
-    constexpr int kSide = 48;
+    constexpr int kPixels = 48;
     for (const bool skinned : {false, true})
         for (const bool open : {false, true}) {
             GltfText g;
@@ -164,23 +164,23 @@ TEST(Bends, MotionBetweenFramesIsThatOfThePoint) {
                 animate(g, 0, "weights", {0, 1}, {0, 1}, "SCALAR");
             }
             const Scene s = loadBent(g, {0.5, open ? 0.52 : 0.5, 0.1});
-            const Plan plan = planEffects(s, {0, kSide, kSide, 12, {}});
+            const Plan plan = planEffects(s, {0, kPixels, kPixels, 12, {}});
             EXPECT_TRUE(plan.motion.recorded);
             EXPECT_NE(plan.motion.reason.find("deforms"), std::string::npos) << plan.motion.reason;
             const Accelerator accelerator(s);
-            const View view(s.cameras[0], kSide, kSide);
-            const FrameMotion motion(s, s.cameras[0], kSide, kSide);
-            const double focal = kSide / 2 / std::tan(0.4);
+            const View view(s.cameras[0], kPixels, kPixels);
+            const FrameMotion motion(s, s.cameras[0], kPixels, kPixels);
+            const double focal = kPixels / 2 / std::tan(0.4);
             const float time = 0.4f;
             const double right = 1 + 4 * (0.5 + (open ? 0.4 * 0.02 : 0));
             int met = 0;
-            for (int i = 0; i < kSide; ++i) {
+            for (int i = 0; i < kPixels; ++i) {
                 const float x = static_cast<float>(i) + 0.3f;
                 const Ray ray = view.ray(x, 25.1f, {}, time);
                 const auto hit = accelerator.intersect(ray, 0);
                 if (!hit) continue;
                 ++met;
-                const double world = (static_cast<double>(x) - kSide / 2) / focal * 3;
+                const double world = (static_cast<double>(x) - kPixels / 2) / focal * 3;
                 const double way = focal / 3 * 0.4 * (world + 1) / (right + 1);
                 const Moved moved = motion.of(ray, hit);
                 EXPECT_NEAR(moved.after.x, way, 2e-3) << skinned << open;

@@ -13,19 +13,19 @@
 namespace vlx::render {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 constexpr const char* kMeshopt = "EXT_meshopt_compression";
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
-Json* extensionOf(Json& object, const char* name) {
+OrderedJson* extensionOf(OrderedJson& object, const char* name) {
     if (!object.is_object() || !object.contains("extensions") || !object["extensions"].contains(name))
         return nullptr;
     return &object["extensions"][name];
 }
 
-void eachOf(Json& object, const char* array, const auto& visit) {
+void eachOf(OrderedJson& object, const char* array, const auto& visit) {
     if (object.is_object() && object.contains(array))
-        for (Json& item : object[array]) visit(item);
+        for (OrderedJson& item : object[array]) visit(item);
 }
 
 /// The text of a member of an extension's object, or nothing.
@@ -82,26 +82,26 @@ int addView(tinygltf::Model& model, std::vector<unsigned char> bytes) {
 
 std::string withCompressedViews(const std::string& json) {
     if (json.find(kMeshopt) == std::string::npos && json.find(kDraco) == std::string::npos) return json;
-    Json file = Json::parse(json);
-    eachOf(file, "buffers", [](Json& buffer) {
-        const Json* meshopt = extensionOf(buffer, kMeshopt);
+    OrderedJson file = OrderedJson::parse(json);
+    eachOf(file, "buffers", [](OrderedJson& buffer) {
+        const OrderedJson* meshopt = extensionOf(buffer, kMeshopt);
         if (meshopt == nullptr || meshopt->value("fallback", false) == false) return;
         buffer = {{"byteLength", 1}, {"uri", "data:application/octet-stream;base64,AA=="}};
     });
-    eachOf(file, "bufferViews", [](Json& view) {
-        const Json* meshopt = extensionOf(view, kMeshopt);
+    eachOf(file, "bufferViews", [](OrderedJson& view) {
+        const OrderedJson* meshopt = extensionOf(view, kMeshopt);
         if (meshopt == nullptr) return;
         for (const char* key : {"buffer", "byteOffset", "byteLength"})
             view[key] = meshopt->value(key, std::uint64_t{0});
     });
-    eachOf(file, "meshes", [&](Json& mesh) {
-        eachOf(mesh, "primitives", [&](Json& primitive) {
-            const Json* draco = extensionOf(primitive, kDraco);
+    eachOf(file, "meshes", [&](OrderedJson& mesh) {
+        eachOf(mesh, "primitives", [&](OrderedJson& primitive) {
+            const OrderedJson* draco = extensionOf(primitive, kDraco);
             if (draco == nullptr) return;
-            const auto isPlain = [&](const Json& accessor) {
+            const auto isPlain = [&](const OrderedJson& accessor) {
                 return file["accessors"][accessor.get<std::size_t>()].contains("bufferView");
             };
-            const Json attributes = primitive.value("attributes", Json::object());
+            const OrderedJson attributes = primitive.value("attributes", OrderedJson::object());
             if (attributes.contains("POSITION") && isPlain(attributes["POSITION"])) {
                 primitive["extensions"].erase(kDraco);
             } else if (primitive.contains("indices") && !isPlain(primitive["indices"])) {
@@ -111,7 +111,7 @@ std::string withCompressedViews(const std::string& json) {
             }
         });
     });
-    return file.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return file.dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
 void GltfFile::decodeMeshopt() {

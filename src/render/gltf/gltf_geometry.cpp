@@ -18,7 +18,7 @@ constexpr std::uint32_t kMostSteps = 16;
 constexpr float kTolerance = 1e-3f;
 
 /// The greatest way that a vertex has from one of two blocks to the other, or from the middle between two.
-float wayBetween(const VertexBlock& a, const VertexBlock& b) {
+float greatestWay(const VertexBlock& a, const VertexBlock& b) {
     float way = 0;
     for (std::size_t i = 0; i < a.positions.size(); ++i)
         way = std::max(way, maxComponent(absolute(b.positions[i] - a.positions[i])));
@@ -42,8 +42,8 @@ std::vector<VertexBlock> followedBlocks(const std::function<VertexBlock(double)>
         for (std::size_t i = 0; i < steps; ++i) {
             finer.push_back(at((static_cast<double>(i) + 0.5) / static_cast<double>(steps)));
             off = std::max(off, offMiddle(blocks[i], finer.back(), blocks[i + 1]));
-            extent =
-                std::max({extent, wayBetween(blocks[0], blocks[i + 1]), wayBetween(blocks[0], finer.back())});
+            extent = std::max(
+                {extent, greatestWay(blocks[0], blocks[i + 1]), greatestWay(blocks[0], finer.back())});
         }
         if (extent == 0) return {blocks[steps / 2]};
         if (off <= kTolerance * extent || steps >= kMostSteps) return blocks;
@@ -137,7 +137,7 @@ std::vector<VertexBlock> GeometryReader::blocksOf(const PrimitiveVertices& verti
     for (std::size_t i = 0; i < steps; ++i) {
         const VertexBlock& own = blocks[blocks.size() == 1 ? 0 : std::min(i, blocks.size() - 1)];
         if (blocks.size() == steps || blocks.size() == 1)
-            way = std::max({way, wayBetween(own, before[i]), wayBetween(own, after[i])});
+            way = std::max({way, greatestWay(own, before[i]), greatestWay(own, after[i])});
         else
             way = 1;  // the neighbours move otherwise
     }

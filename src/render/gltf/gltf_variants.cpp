@@ -5,10 +5,10 @@
 namespace vlx::render {
 namespace {
 
-constexpr const char* kExtension = "KHR_materials_variants";
+constexpr const char* kVariants = "KHR_materials_variants";
 
 /// The elements of an array that is a member of an object, if it is there.
-std::vector<tinygltf::Value> listOf(const tinygltf::Value* object, const std::string& key) {
+std::vector<tinygltf::Value> elementsOf(const tinygltf::Value* object, const std::string& key) {
     if (object == nullptr || !object->Has(key) || !object->Get(key).IsArray()) return {};
     return object->Get(key).Get<tinygltf::Value::Array>();
 }
@@ -17,7 +17,8 @@ std::vector<tinygltf::Value> listOf(const tinygltf::Value* object, const std::st
 
 int variantNamed(const GltfFile& file, const std::string& wanted) {
     std::vector<std::string> names;
-    for (const tinygltf::Value& variant : listOf(extension(file.model().extensions, kExtension), "variants"))
+    for (const tinygltf::Value& variant :
+         elementsOf(extension(file.model().extensions, kVariants), "variants"))
         names.push_back(variant.IsObject() && variant.Has("name") && variant.Get("name").IsString()
                             ? variant.Get("name").Get<std::string>()
                             : "");
@@ -34,8 +35,9 @@ int variantNamed(const GltfFile& file, const std::string& wanted) {
 
 int materialIn(const tinygltf::Primitive& primitive, int variant) {
     if (variant >= 0)
-        for (const tinygltf::Value& mapping : listOf(extension(primitive.extensions, kExtension), "mappings"))
-            for (const tinygltf::Value& of : listOf(&mapping, "variants"))
+        for (const tinygltf::Value& mapping :
+             elementsOf(extension(primitive.extensions, kVariants), "mappings"))
+            for (const tinygltf::Value& of : elementsOf(&mapping, "variants"))
                 if (of.IsNumber() && of.GetNumberAsInt() == variant)
                     return static_cast<int>(number(mapping, "material", -1));
     return primitive.material;
