@@ -108,7 +108,7 @@ import json, subprocess, sys
 done = subprocess.run([{os.path.join(BIN, "vlx-krige")!r}, *sys.argv[1:]], stdout=subprocess.PIPE, text=True)
 if "--json" in sys.argv and done.stdout:
     report = json.loads(done.stdout)
-    report["predictedRelMSE"] = 0.04 * (2 / (report["samples"] / 1280)) ** 0.6
+    report["predictedRelMse"] = 0.04 * (2 / (report["samples"] / 1280)) ** 0.6
     done.stdout = json.dumps(report)
 print(done.stdout, end="")
 sys.exit(done.returncode)

@@ -198,10 +198,9 @@ class Shot:
 
     def judge(self, frame, report):
         """Whether the picture is good enough; if not, more images are asked for."""
-        error = report.get("predictedRelMSE")
-        if self.options.target and "predictedRelMSE" not in report:
-            raise Failure(f"{self.programs.paths['vlx-krige']}: expected it to predict the relMSE (predictedRelMSE) for "
-                          "--target-error, found none: it is of another version")
+        error = report.get("predictedRelMse")
+        if self.options.target and "predictedRelMse" not in report:
+            raise Failure("--target-error: expected vlx-krige to predict the relMSE, found none (--method gaussian has no error map)")
         error = math.inf if error is None and self.options.target else error  # of nothing but black
         missed = self.options.target and not error <= self.options.target
         if missed and frame.images < self.options.most_images:
@@ -232,7 +231,7 @@ class Shot:
         samples = frame.images * self.options.samples
         said = "" if error is None else f", predicted relMSE {error:.3g}"
         if self.log.form == "json":
-            self.log.record("frame", frame=number, output=os.path.abspath(output), samples=samples, predictedRelMSE=error)
+            self.log.record("frame", frame=number, output=os.path.abspath(output), samples=samples, predictedRelMse=error)
         else:
             self.log.say(f"{output}: {samples} samples a pixel{said}")
 
