@@ -144,7 +144,7 @@ TEST(VlxTrace, ExplainsWhatTheSceneCallsFor) {
     const ToolRun run = trace({kScene, "--explain=json"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
     const auto j = nlohmann::json::parse(run.out);
-    ASSERT_EQ(j["effects"].size(), 20u);
+    ASSERT_EQ(j["effects"].size(), 21u);
     EXPECT_TRUE(j["integrator"]["chosen"] == "path" || j["integrator"]["chosen"] == "bidirectional");
     EXPECT_NE(j["integrator"]["reason"].get<std::string>().find("caustics"), std::string::npos);
     std::map<std::string, nlohmann::json> byName;

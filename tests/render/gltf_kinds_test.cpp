@@ -11,6 +11,7 @@
 #include "render/integrator/integrator.h"
 #include "render/plan/plan.h"
 #include "render/scene/accelerator.h"
+#include "render/scene/camera_placement.h"
 #include "render/scene/scene_loader.h"
 
 namespace vlx::render {
@@ -26,8 +27,18 @@ nlohmann::ordered_json& kinds() {
     return all;
 }
 
+/// The camera that vlx-trace makes where there is none.
+void placeCamera(Scene& scene) {
+    if (!scene.cameras.empty()) return;
+    const Viewpoint view = framed(scene.boundsMin, scene.boundsMax, 1);
+    Camera& camera = scene.cameras.emplace_back();
+    camera.verticalFov = view.verticalDegrees * (kPi / 180);
+    camera.toWorld = lookingAt(view.position, view.target);
+}
+
 /// The plain mean, as vlx-trace takes it.
 Picture trace(Scene scene, IntegratorKind kind) {
+    placeCamera(scene);
     const std::size_t camera = scene.activeCamera;
     RenderOptions options;
     const Plan plan = planEffects(scene, {camera, kSide, kSide, options.path.maxBounces, {}});
@@ -101,8 +112,13 @@ TEST_P(EachKind, ShowsWhatItMust) {
         const std::string variant = how.value("variant", "");
         SCOPED_TRACE("shutter " + how.value("shutter", nlohmann::ordered_json()).dump() + " variant " +
                      variant);
+        EnvironmentOptions environment;
+        if (how.contains("environment")) {
+            const std::array<float, 3> all = how["environment"];
+            environment.constant = Rgb{all[0], all[1], all[2]};
+        }
         const Scene scene =
-            loadScene(VLX_GLTF_KINDS "/" + GetParam() + ".gltf", {}, shutter, {.variant = variant});
+            loadScene(VLX_GLTF_KINDS "/" + GetParam() + ".gltf", environment, shutter, {.variant = variant});
         for (const IntegratorKind integrator : {IntegratorKind::Path, IntegratorKind::Bidirectional})
             expectShown(trace(scene, integrator), how["regions"]);
     }

@@ -58,7 +58,7 @@ class File:
     # What is seen
 
     def picture(self, **how):
-        """A further picture, with `shutter` or `variant`; at first black everywhere."""
+        """A further picture, with `shutter`, `variant` or `environment`; at first black everywhere."""
         self.pictures.append({**how, "regions": []})
         self.shows(-2, -2, 2, 2, BLACK)
 
@@ -695,37 +695,37 @@ def emissive_strength():
     return f
 
 
-# These three wait for cameras that are made and orthographic ones, and scenes without light: until then a camera and a
-# light stand in. What is to be seen is the same.
-STAND_IN = True
-
-
 def orthographic():
     f = File()
     node = f.json["nodes"][f.json["scenes"][0]["nodes"][0]]
     f.quad(f.unlit(GREEN), -1, -1, 1, 1)
     f.shows(-1, -1, 1, 1, GREEN)
-    if not STAND_IN:
-        f.json["cameras"][node["camera"]] = {"type": "orthographic", "orthographic": {
-            "xmag": 2, "ymag": 2, "znear": 0.1, "zfar": 10}}
+    f.json["cameras"][node["camera"]] = {"type": "orthographic", "orthographic": {
+        "xmag": 2, "ymag": 2, "znear": 0.1, "zfar": 10}}
     return f
 
 
 def no_camera():
+    """Of the camera that is made: the quad is in the middle, aslant, and the corners are empty."""
     f = File()
     f.quad(f.unlit(GREEN), -1, -1, 1, 1)
-    f.shows(-1, -1, 1, 1, GREEN)
-    if not STAND_IN:
-        f.json["nodes"][0].pop("camera")
-        f.json["cameras"] = []
-        f.pictures[0]["regions"] = []
+    f.json["nodes"][0].pop("camera")
+    f.json["cameras"] = []
+    f.shows(-2, -2, 2, 2, None)
+    f.shows(-0.5, -0.5, 0.5, 0.5, GREEN)
+    for x in (-2, 1.75):
+        for y in (-2, 1.75):
+            f.shows(x, y, x + 0.25, y + 0.25, BLACK)
     return f
 
 
 def no_light():
-    f = File(light=STAND_IN)
+    """Lit by what an option says is all around."""
+    f = File()
     f.quad(f.surface((0.5, 0.5, 0.5), specular=DULL), -1, -1, 1, 1)
-    f.shows(-1, -1, 1, 1, (0.5, 0.5, 0.5) if STAND_IN else BLACK, 0.03, mean=True)
+    f.pictures[0]["environment"] = [1, 1, 1]
+    f.shows(-2, -2, 2, 2, WHITE)
+    f.shows(-1, -1, 1, 1, (0.5, 0.5, 0.5), 0.03, mean=True)
     return f
 
 
@@ -749,6 +749,8 @@ def sheet(folder, kinds, programs, out):
                 command += ["--shutter", ",".join(map(str, how["shutter"]))]
             if "variant" in how:
                 command += ["--variant", how["variant"]]
+            if "environment" in how:
+                command += ["--env-constant", ",".join(map(str, how["environment"]))]
             subprocess.run(command, check=True)
             tiles.append(tile)
         rows = -(-len(tiles) // 8)
