@@ -145,6 +145,7 @@ def serve():
             prepare(scene, layer)
             prepared = True
         render_image(scene, request)
+        os.write(2, b"\nvlx\n")  # ends what Blender says of it
         answer(rendered=request["path"])
 
 

@@ -34,6 +34,8 @@ class Blender:
     def __init__(self, program, scene, wish, children, temporary, threads=0, sampled=lambda fraction: None):
         self.scene, self.children, self.sampled = scene, children, sampled
         self.said = collections.deque(maxlen=200)  # Blender's last lines
+        self.unwritten = ""  # what it says of a file that it could not write, and finishes all the same
+        self.heard = threading.Semaphore(0)  # all that it said of an image
         found = shutil.which(program)
         if not found:
             raise Failure(f"{program}: expected Blender 3.4 or later, found no such program (--blender PATH)")
@@ -49,7 +51,12 @@ class Blender:
 
     def listen(self):
         for line in self.process.stderr:
+            if line == "vlx\n":
+                self.heard.release()
+                continue
             self.said.append(line.rstrip())
+            if re.match(r"OpenEXR-\w+: ERROR", line):
+                self.unwritten = line.rstrip()
             sample = re.search(r"\| Sample (\d+)/(\d+)", line)
             if sample and int(sample[2]):
                 self.sampled(int(sample[1]) / int(sample[2]))
@@ -90,6 +97,10 @@ class Blender:
         except BrokenPipeError:
             pass  # the answer says why
         self.answer()
+        while not self.heard.acquire(timeout=1) and self.listener.is_alive():
+            pass
+        if self.unwritten:
+            self.fail(self.unwritten)
 
     def close(self):
         self.process.stdin.close()
