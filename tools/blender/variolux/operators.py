@@ -73,9 +73,7 @@ atexit.register(end)
 
 
 def file_to_render(temporary):
-    """The file itself if it is saved as it is, else a copy."""
-    if bpy.data.filepath and not bpy.data.is_dirty:
-        return bpy.data.filepath
+    """A copy of what is open: changes by scripts do not make a file dirty."""
     path = os.path.join(temporary, os.path.basename(bpy.data.filepath) or "untitled.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False, relative_remap=True)
     return path
