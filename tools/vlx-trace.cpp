@@ -85,6 +85,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     if (!request) throw CLI::ValidationError("--effects", broken);
     Shutter exposure;
     if (o.shutter.size() == 2) exposure = {o.shutter[0], o.shutter[1]};
+    const Shutter first = exposure;
     if (o.frame) {
         exposure.open += *o.frame / o.framesPerSecond;
         exposure.close += *o.frame / o.framesPerSecond;
@@ -103,10 +104,13 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     std::optional<EarlierDump> earlier;
     if (!o.earlierPath.empty()) takeSizeOf(o, earlier.emplace(o.earlierPath));
     chooseView(o, loadCameras(o.scene, exposure));
-    Scene loaded = loadScene(o.scene, o.environment, exposure);
+    Scene loaded = loadScene(o.scene, o.environment, exposure, {o.lightUnits, o.variant});
     for (const std::string& warning : loaded.report.warnings) note(o, "warning: " + warning);
+    for (const std::string& told : loaded.report.notes) note(o, told);
     if (loaded.report.degenerateTriangles > 0)
         note(o, std::to_string(loaded.report.degenerateTriangles) + " triangles without area were dropped");
+
+    placeCamera(o, loaded, first);
 
     std::optional<SampleMap> map;
     if (!o.mapPath.empty()) {
@@ -134,6 +138,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     if (report.nonFinite > 0)
         note(o, "warning: " + std::to_string(report.nonFinite) +
                     " samples overflowed and were written as black");
+    warnOfBrightness(o, loaded, report);
     summarize(o, loaded, report);
     return vlx::kDone;
 }

@@ -35,7 +35,7 @@ namespace {
 // Bands that wait for compression; one more is being compressed.
 constexpr std::size_t kQueuedBands = 2;
 
-constexpr std::int64_t kMaxInt = std::numeric_limits<std::int32_t>::max();
+constexpr std::int64_t kMostBytes = std::numeric_limits<std::int32_t>::max();
 
 void appendValues(Bytes& bytes, ChannelType type, const float* values, std::size_t count) {
     bytes.resize(bytes.size() + count * valueBytes(type));
@@ -67,8 +67,8 @@ float pixelMean(const float* values, const float* hits, std::uint64_t begin, std
 }
 
 // Memory of a task, and what it makes; kept from band to band.
-struct Scratch {
-    explicit Scratch(DumpCompression compression) : packer(compression) {}
+struct PackScratch {
+    explicit PackScratch(DumpCompression compression) : packer(compression) {}
     Packer packer;
     Bytes values;
 };
@@ -134,7 +134,7 @@ struct DumpWriter::Impl {
             const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(band.width);
             const std::uint64_t samples =
                 band.offsets[first + static_cast<std::size_t>(band.width)] - band.offsets[first];
-            if (samples > static_cast<std::uint64_t>(kMaxInt) / bytesPerSample)
+            if (samples > static_cast<std::uint64_t>(kMostBytes) / bytesPerSample)
                 damaged("has a row of " + std::to_string(samples) + " samples, more than OpenEXR can hold");
         }
     }
@@ -157,7 +157,7 @@ struct DumpWriter::Impl {
                                          " of " + windowText(header.data) + " is missing");
         if (hasSplats()) writeFlatRows();
         Bytes value;
-        append(value, static_cast<std::uint32_t>(std::min<std::uint64_t>(maxSamples, kMaxInt)));
+        append(value, static_cast<std::uint32_t>(std::min<std::uint64_t>(maxSamples, kMostBytes)));
         disk.writeAt(encoded.maxSamplesPerPixel, value);
         if (renderSeconds > 0) {
             value.clear();
@@ -301,7 +301,7 @@ struct DumpWriter::Impl {
         }
     }
 
-    static void packFlat(std::uint32_t part, int y, std::span<const float> values, Scratch& scratch,
+    static void packFlat(std::uint32_t part, int y, std::span<const float> values, PackScratch& scratch,
                          Bytes& chunk) {
         scratch.values.clear();
         for (const float v : values) append(scratch.values, v);
@@ -313,7 +313,7 @@ struct DumpWriter::Impl {
         chunk.insert(chunk.end(), packed.begin(), packed.end());
     }
 
-    void encodeSamples(const SampleBand& band, int row, Scratch& scratch, Bytes& chunk) const {
+    void encodeSamples(const SampleBand& band, int row, PackScratch& scratch, Bytes& chunk) const {
         const auto width = static_cast<std::size_t>(band.width);
         const std::uint64_t* offsets = band.offsets.data() + static_cast<std::size_t>(row) * width;
         const std::uint64_t samples = offsets[width] - offsets[0];
@@ -359,7 +359,7 @@ struct DumpWriter::Impl {
     std::vector<float> beautyMeans;     // of all rows, where splats are to be added
     std::optional<SplatImages> splats;  // the caller's
     std::atomic<std::int64_t> cpu{0};
-    mutable Pool<Scratch> pool{[this] { return std::make_unique<Scratch>(header.compression); }};
+    mutable Pool<PackScratch> pool{[this] { return std::make_unique<PackScratch>(header.compression); }};
 
     std::mutex mutex;  // guards the following
     std::condition_variable room, ready;

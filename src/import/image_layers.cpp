@@ -19,10 +19,12 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <set>
 
 #include "dump/stored_values.h"
 #include "exr/flat_header.h"
 #include "exr/flat_images.h"
+#include "exr/header_copy.h"
 #include "import/channel_presets.h"
 #include "variolux/base/channel_names.h"
 #include "variolux/base/error.h"
@@ -321,10 +323,10 @@ LayerCopy copyWithLayers(const std::string& from, const std::string& to, const I
         std::vector<PartPlan> plans = Planner(from, image, replace, report).plan(in);
         std::vector<Imf::Header> headers;
         for (const PartPlan& plan : plans) headers.push_back(plan.header);
-        for (const auto& [name, text] : attributes) {
-            headers.front().erase(name);  // whatever its type
-            headers.front().insert(name, Imf::StringAttribute(text));
-        }
+        std::set<std::string> replaced;  // whatever their type
+        for (const auto& attribute : attributes) replaced.insert(attribute.first);
+        headers.front() = headerWithout(headers.front(), replaced);
+        for (const auto& [name, text] : attributes) headers.front().insert(name, Imf::StringAttribute(text));
         writing = true;
         Imf::StdOFStream stream(bytes, file.temporaryPath().c_str());
         Imf::MultiPartOutputFile out(stream, headers.data(), static_cast<int>(headers.size()), false, 0);

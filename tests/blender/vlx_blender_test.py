@@ -274,7 +274,7 @@ class AddOn(Case):
         archive = os.path.join(BIN, "..", "tools", "blender", "variolux-blender.zip")
         scene = shutil.copy(os.path.join(SCENES, "plain.blend"), self.path("scene.blend"))
         printed = blender(os.path.join(HERE, "addon_steps.py"), archive, os.path.join(BIN, "vlx-blender"), self.folder, scene=scene, env=home)
-        found = json.loads(next(line for line in printed.splitlines() if line.startswith("found {"))[6:])
+        found = json.loads(printed.split("\nfound ")[1].splitlines()[0])
         self.assertEqual(found["still"], ["FINISHED"])
         self.assertIn("stddev", found["still node"]["outputs"])
         self.assertIn("Combined_fill", found["still node"]["outputs"])

@@ -278,7 +278,7 @@ TEST_F(CompareTool, WhereNothingIsFoundTheLayersAreListed) {
     const ToolRun missing = run({ref_, folder_ / "passes.exr"});
     EXPECT_EQ(missing.exitCode, 1);
     EXPECT_NE(missing.err.find("passes.exr: expected channels R, G, B"), std::string::npos) << missing.err;
-    EXPECT_NE(missing.err.find("(--layer NAME names one), found the layers V.Normal, V.Depth"),
+    EXPECT_NE(missing.err.find("(--layer NAME names one), found the layers V.Depth, V.Normal"),
               std::string::npos);
 }
 

@@ -63,6 +63,13 @@ TEST(VlxTrace, BadUsageIsExitTwo) {
                                                       {kScene, "-o", out, "--tolerance", "0.1"},
                                                       {kScene, "-o", out, "--compression", "zip"},
                                                       {kScene, "-o", out, "--effects", "some"},
+                                                      {kScene, "-o", out, "--look-at", "1,2"},
+                                                      {kScene, "-o", out, "--look-at", "1,2,nan"},
+                                                      {kScene, "-o", out, "--camera-position", "1,inf,2"},
+                                                      {kScene, "-o", out, "--fov", "180"},
+                                                      {kScene, "-o", out, "--fov", "0"},
+                                                      {kScene, "-o", out, "--light-units", "lumens"},
+                                                      {kScene, "--list-cameras", "--fov", "30"},
                                                       {kScene, "-o", out, "--effects", "auto,-fog"},
                                                       {kScene, "-o", out, "--effects"},
                                                       {kScene, "--explain=xml"},
@@ -137,7 +144,7 @@ TEST(VlxTrace, ExplainsWhatTheSceneCallsFor) {
     const ToolRun run = trace({kScene, "--explain=json"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
     const auto j = nlohmann::json::parse(run.out);
-    ASSERT_EQ(j["effects"].size(), 20u);
+    ASSERT_EQ(j["effects"].size(), 21u);
     EXPECT_TRUE(j["integrator"]["chosen"] == "path" || j["integrator"]["chosen"] == "bidirectional");
     EXPECT_NE(j["integrator"]["reason"].get<std::string>().find("caustics"), std::string::npos);
     std::map<std::string, nlohmann::json> byName;
@@ -250,7 +257,7 @@ std::string camerasOnly(const std::string& path, const std::string& cameras) {
 }
 
 const std::string kFlat =
-    R"({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9}})";
+    R"({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 0, "znear": 0.1, "zfar": 9}})";
 
 std::string perspective(const std::string& aspect) {
     return R"({"type": "perspective", "perspective": {"yfov": 0.6, "znear": 0.1, "aspectRatio": )" + aspect +
@@ -264,12 +271,12 @@ TEST(VlxTrace, ListsTheCamerasOfAnyScene) {
                                "--list-cameras"});
     EXPECT_EQ(run.exitCode, 0) << run.err;
     EXPECT_EQ(run.out,
-              "0  cam0  unusable: it is not a perspective camera\n"
+              "0  cam0  unusable: its ymag is 0, expected more than 0\n"
               "1  cam1  (active)\n"
               "2  cam2  unusable: its aspectRatio is 2e-08, expected 2^-20 to 2^20\n");
     const ToolRun none = trace({camerasOnly(folder / "b.gltf", "[" + kFlat + "]"), "--list-cameras"});
     EXPECT_EQ(none.exitCode, 0) << none.err;
-    EXPECT_EQ(none.out, "0  cam0  unusable: it is not a perspective camera\n");
+    EXPECT_EQ(none.out, "0  cam0  unusable: its ymag is 0, expected more than 0\n");
     EXPECT_NE(none.err.find("no camera that can be used"), std::string::npos) << none.err;
     std::ofstream(folder / "c.gltf")
         << R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]})";
@@ -293,7 +300,7 @@ TEST(VlxTrace, TakesTheFirstUsableCameraAndSaysSo) {
     EXPECT_EQ(chosen.err.find("cannot be used"), std::string::npos) << chosen.err;
     const ToolRun asked = trace({scene, "-o", folder / "c.exr", "--env-constant", "1,1,1", "--camera", "0"});
     EXPECT_NE(asked.exitCode, 0);
-    EXPECT_NE(asked.err.find("not a perspective"), std::string::npos) << asked.err;
+    EXPECT_NE(asked.err.find("its ymag is 0"), std::string::npos) << asked.err;
 }
 
 TEST(VlxTrace, WhatIsWrongWithTheViewIsToldBeforeTheSceneIsRead) {

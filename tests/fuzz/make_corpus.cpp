@@ -61,6 +61,35 @@ void scenes(const fs::path& folder) {
     const std::string text = scene.text(), binary = scene.binary();
     write(folder / "text", {text.begin(), text.end()});
     write(folder / "binary", {binary.begin(), binary.end()});
+    render::GltfText bent;  // all that bends, is instanced, chosen and compressed
+    nlohmann::json& j = bent.json;
+    auto& primitive = j["meshes"][0]["primitives"][0];
+    j["accessors"].push_back({{"bufferView", bent.view(std::vector<std::uint16_t>(16, 0))},
+                              {"componentType", 5123},
+                              {"count", 4},
+                              {"type", "VEC4"}});
+    primitive["attributes"]["JOINTS_0"] = j["accessors"].size() - 1;
+    primitive["attributes"]["WEIGHTS_0"] =
+        bent.floats({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
+    primitive["targets"] = {{{"POSITION", 0}, {"NORMAL", 0}}};
+    primitive["extensions"]["KHR_materials_variants"]["mappings"] = {{{"material", 0}, {"variants", {0}}}};
+    j["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "one"}}};
+    j["meshes"][0]["weights"] = {0.5};
+    j["materials"][0]["extensions"]["KHR_materials_unlit"] = nlohmann::json::object();
+    j["skins"] = {{{"joints", {0, 1}}}};
+    j["nodes"][0]["skin"] = 0;
+    j["nodes"].push_back({{"mesh", 0}});
+    j["nodes"][3]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = 0;
+    j["scenes"][0]["nodes"] = {0, 1, 2, 3};
+    animate(bent, 0, "weights", {0, 1}, {0, 1}, "SCALAR");
+    const std::string bentText = bent.text();
+    write(folder / "bent", {bentText.begin(), bentText.end()});
+    j["bufferViews"][0]["extensions"]["EXT_meshopt_compression"] = {
+        {"buffer", 0}, {"byteLength", 48}, {"byteStride", 12}, {"count", 4}, {"mode", "ATTRIBUTES"}};
+    primitive["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 1},
+                                                             {"attributes", {{"POSITION", 0}}}};
+    const std::string compressed = bent.text();
+    write(folder / "compressed", {compressed.begin(), compressed.end()});
 }
 
 }  // namespace

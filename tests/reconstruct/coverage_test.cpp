@@ -63,7 +63,12 @@ TEST(Coverage, AnOpaqueCardIsOpaqueAndItsEdgesAreNoWorseThanTheSamples) {
                 on += card(x + (i % 20 + 0.5) / 20, y + (i / 20 + 0.5) / 20, none).first > 0;
             truth.push_back(on / 400.0);
         }
-    for (const int spp : {4, 8, 16}) {
+#ifdef VARIOLUX_SANITIZED
+    const std::vector<int> counts = {4};
+#else
+    const std::vector<int> counts = {4, 8, 16};
+#endif
+    for (const int spp : counts) {
         double kriged = 0, own = 0;
         int agree = 0, doubted = 0;
         for (unsigned seed = 1; seed <= 4; ++seed) {

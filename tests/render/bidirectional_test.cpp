@@ -114,6 +114,7 @@ Light pointLight(LightType type = LightType::Point) {
     if (type == LightType::Spot) {
         l.coneScale = 1 / (0.95f - 0.7f);
         l.coneOffset = -0.7f * l.coneScale;
+        l.coneStep = l.coneCosine = 1;  // Cycles'
     }
     if (type == LightType::Sphere) l.radius = 0.1f;
     return l;
@@ -296,6 +297,64 @@ TEST(BidirectionalCamera, ProjectsItsOwnRays) {
             EXPECT_NEAR(p.density * length(cross(dx, dy)) / (e * e), 1, 2e-2);
             EXPECT_EQ(view.project(ray.origin - ray.direction, lens).density, 0);
         }
+    }
+}
+
+TEST(BidirectionalCamera, OrthographicOnesAgree) {
+    for (const float lens : {0.f, 0.15f}) {
+        TestScene t;
+        room(t);
+        lamp(t);
+        t.light(pointLight());
+        t.scene().cameras[0].orthographicHeight = 2.2f;
+        t.scene().cameras[0].lensRadius = lens;
+        t.scene().cameras[0].focusDistance = 3;
+        expectAgreement(t);
+    }
+}
+
+/// A lamp of one by one before a camera that sees two by two, four pixels to a side: the four in the middle
+/// hold all of it, and nothing else is lit; beside it a floor whose light is known.
+TEST(BidirectionalCamera, OrthographicOnesSeeWhatIsThereInItsSize) {
+    TestScene t;
+    t.quad(t.material(TestScene::emitter(Rgb(3))), {-0.5f, -0.5f, 0}, {0.5f, -0.5f, 0}, {0.5f, 0.5f, 0},
+           {-0.5f, 0.5f, 0});
+    t.camera({0, 0, 7}, {0, 0, 0}, 1);
+    t.scene().cameras[0].orthographicHeight = 2;
+    const Scene scene = t.finish();
+    const Accelerator accelerator(scene);
+    const View view(scene.cameras[0], 4, 4);
+    const PathTracer path(scene, accelerator, view, {});
+    const BidirectionalTracer both(scene, accelerator, view, {0, 0, 4, 4}, {});
+    std::vector<Splat> splats;
+    for (int pixel = 0; pixel < 16; ++pixel)
+        for (std::uint32_t i = 0; i < 16; ++i) {
+            const CameraSample s = sampleInPixel(pixel % 4, pixel / 4, hashOf(pixel, 7), i);
+            const bool inside = pixel % 4 % 3 != 0 && pixel / 4 % 3 != 0;
+            for (const Integrator* integrator :
+                 {static_cast<const Integrator*>(&path), static_cast<const Integrator*>(&both)})
+                EXPECT_EQ(integrator->trace(s, splats).radiance, Rgb(inside ? 3.f : 0.f)) << pixel;
+        }
+    EXPECT_TRUE(splats.empty());
+}
+
+/// Light on a floor of which the camera sees four square metres: splats alone add up to what there is.
+TEST(BidirectionalCamera, OrthographicSplatsAddUpToTheLightThereIs) {
+    TestScene t;
+    t.quad(t.material(TestScene::matte(Rgb(0.5f))), {-3, -3, 0}, {3, -3, 0}, {3, 3, 0}, {-3, 3, 0});
+    Light sun;
+    sun.type = LightType::Directional;
+    sun.intensity = Rgb(2);
+    sun.direction = normalized(Vec3{1, 0, -1});
+    t.light(sun);
+    t.camera({4, 0, 4}, {0, 0, 0}, 1);  // aslant
+    t.scene().cameras[0].orthographicHeight = 2;
+    const double expected = 0.5 / kPi * 2 * std::sqrt(0.5);
+    const Setting s(t);
+    for (const Strategies strategies : {Strategies::Splatting, Strategies::DirectLight}) {
+        const Quarters q = s.bidirectional(strategies);
+        for (std::size_t i = 0; i < 4; ++i)
+            EXPECT_NEAR(q.mean[i], expected, kSigmas * q.error[i] + 1e-5) << static_cast<int>(strategies);
     }
 }
 

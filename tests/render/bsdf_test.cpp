@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -298,6 +299,30 @@ TEST(Bsdf, RoughGlassWithoutCompensationIsReciprocalAcrossTheBoundary) {
         EXPECT_NEAR(outward.x / (1.5f * 1.5f), inward.x, 1e-3f * inward.x);
         EXPECT_GT(inward.x, 0.01f);
     }
+}
+
+/// Burley's formula, by the half vector.
+TEST(Bsdf, RetroReflectingSurfacesFollowDisneysFormula) {
+    SurfaceParameters s;
+    s.baseColour = {0.6f, 0.4f, 0.2f};
+    s.specular = 0;
+    s.retro = true;
+    s.albedoTable = &table(1.5f);
+    for (const float roughness : {0.f, 0.4f, 1.f})
+        for (const float cosO : {0.1f, 0.6f, 0.95f})
+            for (const Vec3& wi : {viewFrom(0.2f), normalized(Vec3{-0.9f, 0.1f, 0.15f}), Vec3{0, 0, 1}}) {
+                s.roughness = roughness;
+                const Vec3 wo = viewFrom(cosO);
+                const double toHalf = dot(wi, normalized(wi + wo));
+                const double f90 = 0.5 + 2 * static_cast<double>(roughness) * toHalf * toHalf;
+                const auto side = [&](double cosine) { return 1 + (f90 - 1) * std::pow(1 - cosine, 5); };
+                const double expected = 0.6 / std::numbers::pi * wi.z * side(wi.z) * side(wo.z);
+                const BsdfValue matte = BasicBsdf<kMatte>(s, wo, false, table(1.5f)).evaluate(wi);
+                const BsdfValue whole = Bsdf(s, wo, false, table(1.5f)).evaluate(wi);
+                EXPECT_NEAR(matte.value.x, expected, 1e-5 * expected);
+                EXPECT_NEAR(whole.value.x, expected, 1e-5 * expected);
+                EXPECT_NEAR(matte.pdf, wi.z * kInvPi, 1e-6f);
+            }
 }
 
 TEST(Fresnel, KnownValues) {

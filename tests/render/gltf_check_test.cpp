@@ -46,11 +46,9 @@ void expectFailureWith(const std::vector<std::string>& words, const json& scene,
 }
 
 TEST(RequiredExtensions, AreRefusedFirstByNameAndWithARemedy) {
-    for (const auto& [name, remedy] : {std::pair{"KHR_draco_mesh_compression", "gltf-transform copy"},
-                                       {"EXT_meshopt_compression", "gltfpack without -c"},
-                                       {"KHR_meshopt_compression", "gltf-transform copy"},
+    for (const auto& [name, remedy] : {std::pair{"KHR_meshopt_compression", "gltf-transform copy"},
                                        {"KHR_texture_basisu", "ktxdecompress"},
-                                       {"EXT_texture_webp", "gltf-transform png"},
+                                       {"EXT_texture_avif", "gltf-transform png"},
                                        {"VENDOR_sparkle", "without"}}) {
         // Of all the faults of the file.
         GltfText g;
@@ -62,8 +60,8 @@ TEST(RequiredExtensions, AreRefusedFirstByNameAndWithARemedy) {
         expectFailureWith({std::string("requires the extension ") + name, remedy}, g.json, g);
     }
     GltfText g;
-    g.json["extensionsRequired"] = {"KHR_draco_mesh_compression", "KHR_texture_basisu"};
-    expectFailureWith({"KHR_draco_mesh_compression, KHR_texture_basisu", "copy", "ktxdecompress"}, g.json);
+    g.json["extensionsRequired"] = {"KHR_meshopt_compression", "KHR_texture_basisu"};
+    expectFailureWith({"KHR_meshopt_compression, KHR_texture_basisu", "copy", "ktxdecompress"}, g.json);
     g.json["extensionsRequired"] = {7};
     expectFailureWith({"extensionsRequired", "7"}, g.json);
     g.json["extensionsRequired"] = "KHR_texture_basisu";
@@ -71,14 +69,10 @@ TEST(RequiredExtensions, AreRefusedFirstByNameAndWithARemedy) {
 }
 
 TEST(CompressedData, ThatHasNoPlainFormIsRefusedByName) {
-    GltfText g;
-    g.json["accessors"][0].erase("bufferView");
-    g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["bufferView"] = 0;
-    expectFailureWith({"KHR_draco_mesh_compression", "gltf-transform copy"}, g.json, g);
     GltfText m;
     m.json["buffers"].push_back(
-        {{"byteLength", 60}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
-    expectFailureWith({"EXT_meshopt_compression", "gltfpack"}, m.json, m);
+        {{"byteLength", 60}, {"extensions", {{"KHR_meshopt_compression", {{"fallback", true}}}}}});
+    expectFailureWith({"KHR_meshopt_compression", "gltf-transform copy"}, m.json, m);
 }
 
 TEST(CompressedData, ThatHasAPlainFormIsReadFromThere) {
@@ -89,7 +83,7 @@ TEST(CompressedData, ThatHasAPlainFormIsReadFromThere) {
 }
 
 TEST(Textures, WithoutASourceNameTheExtensionThatHasIt) {
-    for (const char* extension : {"KHR_texture_basisu", "EXT_texture_webp"}) {
+    for (const char* extension : {"KHR_texture_basisu", "EXT_texture_avif"}) {
         GltfText g = textured();
         g.json["textures"][0] = {{"extensions", {{extension, {{"source", 0}}}}}};
         expectFailureWith({"texture 0", "no source", extension, "gltf-transform"}, g.json, g);
@@ -249,28 +243,36 @@ json perspective(double yfov, std::optional<double> aspect = {}) {
     return {{"type", "perspective"}, {"perspective", p}};
 }
 
-const json kOrthographic = {{"type", "orthographic"},
-                            {"orthographic", {{"xmag", 1}, {"ymag", 1}, {"znear", 0.1}, {"zfar", 10}}}};
+json orthographic(double xmag, double ymag) {
+    return {{"type", "orthographic"},
+            {"orthographic", {{"xmag", xmag}, {"ymag", ymag}, {"znear", 0.1}, {"zfar", 10}}}};
+}
+const json kFlat = orthographic(1, 0);
 
 TEST(DefaultCamera, IsTheFirstThatCanBeUsed) {
-    const GltfText g = withCameras({kOrthographic, perspective(0), perspective(0.6)});
+    const GltfText g = withCameras({kFlat, perspective(0), perspective(0.6)});
     const Scene s = load(g.json, g);
     EXPECT_EQ(s.activeCamera, 2u);
     EXPECT_EQ(s.wantedCamera, 0u);
-    GltfText marked = withCameras({perspective(0.6), kOrthographic});
+    GltfText marked = withCameras({perspective(0.6), kFlat});
     marked.json["nodes"][4]["extras"]["active"] = 1;
     const Scene t = load(marked.json, marked);
     EXPECT_EQ(t.activeCamera, 0u);
     EXPECT_EQ(t.wantedCamera, 1u);
 }
 
+void expectFault(const std::vector<std::string>& words, const GltfText& g) {
+    const std::string fault = load(g.json, g).cameraFault;
+    for (const std::string& word : words)
+        EXPECT_NE(fault.find(word), std::string::npos) << word << ": " << fault;
+}
+
 TEST(DefaultCamera, WithoutAUsableOneSaysWhyEachIsNot) {
-    for (const json& bad : {kOrthographic, perspective(0), perspective(-1), perspective(4),
-                            perspective(1e-30), perspective(0.6, 0), perspective(0.6, -1),
-                            perspective(0.6, 2e-8), perspective(0.6, 1e30), perspective(0.6, -0.0)}) {
-        const GltfText g = withCameras({bad, kOrthographic});
-        expectFailureWith({"no camera that can be used", "camera 0", "camera 1", "add a perspective"}, g.json,
-                          g);
+    for (const json& bad :
+         {kFlat, orthographic(-1, 1), orthographic(1, 1e39), orthographic(1e-30, 1), perspective(0),
+          perspective(-1), perspective(4), perspective(1e-30), perspective(0.6, 0), perspective(0.6, -1),
+          perspective(0.6, 2e-8), perspective(0.6, 1e30), perspective(0.6, -0.0)}) {
+        expectFault({"no camera that can be used", "camera 0", "camera 1"}, withCameras({bad, kFlat}));
         // A usable one after it is taken.
         const GltfText good = withCameras({bad, perspective(0.6)});
         EXPECT_EQ(load(good.json, good).activeCamera, 1u) << bad;
@@ -278,7 +280,7 @@ TEST(DefaultCamera, WithoutAUsableOneSaysWhyEachIsNot) {
     for (const json& place : {json{{"scale", {0, 1, 1}}}, json{{"translation", {1e300, 0, 0}}}}) {
         GltfText g = withCameras({perspective(0.6)});
         g.json["nodes"][3].update(place);
-        expectFailureWith({"no camera that can be used", "camera 0"}, g.json, g);
+        expectFault({"no camera that can be used", "camera 0"}, g);
     }
 }
 
@@ -286,9 +288,9 @@ TEST(DefaultCamera, ThatIsElsewhereIsNamed) {
     GltfText g = withCameras({perspective(0.6)});
     g.json["scenes"] = {{{"nodes", {0, 2}}}, {{"nodes", {3}}}};
     g.json["nodes"][3]["name"] = "far";
-    expectFailureWith({"scene 0", "node 3 'far'", "`scene`"}, g.json, g);
+    expectFault({"scene 0", "node 3 'far'", "`scene`"}, g);
     g.json.erase("scene");
-    expectFailureWith({"scene 0", "node 3 'far'"}, g.json, g);
+    expectFault({"scene 0", "node 3 'far'"}, g);
     g.json["scene"] = 1;
     g.json["nodes"][3]["children"] = {2};
     g.json["scenes"][0]["nodes"] = {0};

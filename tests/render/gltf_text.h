@@ -37,7 +37,7 @@ struct GltfText {
             "extensions": {"KHR_lights_punctual": {"lights": [
                 {"type": "point", "intensity": 5, "color": [1, 0.5, 0.25], "name": "lamp"}]}},
             "scene": 0,
-            "scenes": [{"nodes": [0, 1, 2]}],
+            "scenes": [{"nodes": [0, 1, 2], "extras": {"light_units": "radiometric"}}],
             "nodes": [
                 {"mesh": 0, "name": "square"},
                 {"camera": 0, "name": "eye", "translation": [0, 0, 3]},

@@ -72,6 +72,7 @@ TEST(LightQuad, EstimatesWhatTheSingleLightsDo) {
     lights[8].direction = normalized({0.2f, -1, 0.1f});
     lights[8].coneScale = 3;
     lights[8].coneOffset = -2;
+    lights[8].coneStep = 1;
     for (const bool bothSides : {false, true}) {
         const Receiver receiver{{0.3f, 0.5f, -0.2f}, normalized({0.3f, 1, 0.1f}), bothSides};
         for (std::size_t i = 0; i + 4 <= lights.size(); i += 4) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -105,6 +106,30 @@ TEST(FrameMotion, OfACameraThatPassesIsParallax) {
     });
     EXPECT_GT(near, 100);
     EXPECT_LT(near, kSide * kSide - 100);
+}
+
+/// Of an orthographic one it is the same at any distance, and what is at infinity stays.
+TEST(FrameMotion, OfAnOrthographicCameraThatPassesIsItsOwn) {
+    for (const double lens : {0.0, 0.1}) {
+        GltfText g;
+        g.json["cameras"][0] = {{"type", "orthographic"},
+                                {"orthographic", {{"xmag", 3}, {"ymag", 3}, {"znear", 0.1}, {"zfar", 10}}}};
+        g.json["nodes"][1]["extras"] = {{"lens_radius", lens}, {"focus_distance", 3}};
+        addNode(g, 0, {1, 0, -3}, 2);
+        animate(g, 1, "translation", {0, 1}, {0, 0, 3, 1, 0, 3}, "VEC3");
+        const Shot shot(g, {0.5, 0.5, kFrame});
+        int near = 0, far = 0, missed = 0;
+        everywhere([&](float x, float y) {
+            const Shot::Seen seen = shot.at(x, y);
+            (!seen.hit ? missed : seen.depth < 4 ? near : far)++;
+            if (!seen.hit && lens > 0) return;
+            const float way = seen.hit ? static_cast<float>(kSide / 6.0 * kFrame) : 0;
+            EXPECT_NEAR(seen.moved.before.x, way, kRounding);
+            EXPECT_NEAR(seen.moved.after.x, -way, kRounding);
+            EXPECT_NEAR(seen.moved.after.y, 0, kRounding);
+        });
+        EXPECT_GT(std::min({near, far, missed}), 100);
+    }
 }
 
 TEST(FrameMotion, OfACameraThatTurnsIsTheSameAtAnyDistanceAndAtInfinity) {

@@ -158,6 +158,11 @@ Minimal minimal(Effect effect) {
         case EmissiveMeshes:
             add(t, named(TestScene::emitter(Rgb(2))));
             break;
+        case Unlit:
+            m = TestScene::emitter(Rgb(0.4f));
+            m.unlit = true;
+            add(t, named(m));
+            break;
         case SphereLights: {
             Light sphere = lamp();
             sphere.name = "special";
@@ -415,6 +420,9 @@ TEST(Plan, LightsThatReachNothingAreIdle) {
         Scene alone = t.finish();
         const Plan plan = planOf(alone);
         EXPECT_FALSE(plan.of(PunctualLights).planned);
+        EXPECT_FALSE(plan.lit());
+        ASSERT_EQ(plan.warnings.size(), 1u);
+        EXPECT_NE(plan.warnings[0].find("--env-constant 1,1,1"), std::string::npos) << plan.warnings[0];
         EXPECT_NE(plan.of(PunctualLights).reason.find(c.words), std::string::npos)
             << plan.of(PunctualLights).reason;
         applyPlan(alone, plan);

@@ -291,7 +291,7 @@ TEST(LoadScene, CamerasAndTheirExtras) {
         {{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.1}, {"aspectRatio", 1.5}}}});
     g.json["cameras"].push_back(
         {{"type", "orthographic"},
-         {"orthographic", {{"xmag", 1.0}, {"ymag", 1}, {"zfar", 9}, {"znear", 0.1}}}});
+         {"orthographic", {{"xmag", 3}, {"ymag", 1.5}, {"zfar", 9}, {"znear", 0.1}}}});
     g.json["nodes"].push_back({{"camera", 1},
                                {"name", "second"},
                                {"scale", {3, 3, 3}},
@@ -305,7 +305,10 @@ TEST(LoadScene, CamerasAndTheirExtras) {
     EXPECT_EQ(s.cameras[1].focusDistance, 2.5f);
     EXPECT_EQ(s.cameras[1].aspect, 1.5f);
     EXPECT_NEAR(s.cameras[1].toWorld.determinant(), 1, 1e-9);
-    EXPECT_NE(s.cameras[2].unusable, "");
+    EXPECT_EQ(s.cameras[1].orthographicHeight, 0);
+    EXPECT_EQ(s.cameras[2].unusable, "");
+    EXPECT_EQ(s.cameras[2].orthographicHeight, 3);
+    EXPECT_EQ(s.cameras[2].aspect, 2);
 }
 
 TEST(LoadScene, SpotDirectionalAndSphereLights) {
@@ -334,6 +337,104 @@ TEST(LoadScene, SpotDirectionalAndSphereLights) {
     EXPECT_EQ(s.lights[2].type, LightType::Sphere);
     EXPECT_EQ(s.lights[2].radius, 0.25f);
     EXPECT_EQ(s.report.warnings.size(), 1u);  // the light without power
+}
+
+/// A scene of another program, with lights of these intensities.
+GltfText exported(const std::string& generator, const std::vector<std::pair<std::string, double>>& lights) {
+    GltfText g;
+    g.json["asset"]["generator"] = generator;
+    g.json["scenes"][0].erase("extras");
+    auto& list = g.json["extensions"]["KHR_lights_punctual"]["lights"];
+    list = nlohmann::json::array();
+    g.json["nodes"].erase(2);
+    for (const auto& [type, intensity] : lights) {
+        g.json["nodes"].push_back({{"extensions", {{"KHR_lights_punctual", {{"light", list.size()}}}}}});
+        g.json["scenes"][0]["nodes"] = {0, 1};
+        list.push_back({{"type", type}, {"intensity", intensity}});
+    }
+    for (std::size_t i = 2; i < g.json["nodes"].size(); ++i) g.json["scenes"][0]["nodes"].push_back(i);
+    return g;
+}
+
+TEST(LightUnits, AreJudgedByTheFile) {
+    constexpr double kSphere = 4 * 3.14159265358979323846;
+    const auto expect = [](const GltfText& g, float intensity, const std::string& told) {
+        const Scene s = load(g);
+        EXPECT_EQ(s.lights.at(0).intensity.x, intensity) << told;
+        ASSERT_EQ(s.report.notes.size(), told.empty() ? 0 : 1) << told;
+        if (told.empty()) return;
+        EXPECT_NE(s.report.notes[0].find(told), std::string::npos) << s.report.notes[0];
+        EXPECT_NE(s.report.notes[0].find("--light-units"), std::string::npos) << s.report.notes[0];
+    };
+    const std::string blender = "Khronos glTF Blender I/O v3.4.50";
+    // Watts of 32 bits, as Blender has them.
+    const double watts = 0.7f;
+    expect(exported("", {{"point", 683}}), 1, "photometric, in candela");
+    expect(exported("three.js", {{"directional", 3}}), static_cast<float>(3 / 683.0),
+           "photometric, in candela");
+    expect(exported(blender, {{"point", watts / kSphere}}), static_cast<float>(watts / kSphere),
+           "radiometric");
+    expect(exported(blender, {{"point", 683 * watts / kSphere}}), static_cast<float>(watts / kSphere),
+           "photometric, and divided");
+    expect(exported(blender, {{"directional", watts}}), static_cast<float>(watts), "radiometric");
+    expect(exported(blender, {{"directional", 683 * watts}}), static_cast<float>(watts),
+           "photometric, and divided");
+    // Neither, or both: what the extension says.
+    expect(exported(blender, {{"point", 0.123456789012}}), static_cast<float>(0.123456789012 / 683),
+           "nothing shows");
+    expect(exported(blender, {{"point", watts / kSphere}, {"directional", 683 * watts}}),
+           static_cast<float>(watts / kSphere / 683), "nothing shows");
+    // What the file says of itself.
+    GltfText g = exported(blender, {{"point", 683}});
+    g.json["scenes"][0]["extras"]["light_units"] = "photometric";
+    expect(g, 1, "");
+    g.json["scenes"][0]["extras"]["light_units"] = "radiometric";
+    expect(g, 683, "");
+    g.json["scenes"][0]["extras"] = {{"env_constant", {1, 1, 1}}};
+    expect(g, 683, "");
+    g.json["scenes"][0].erase("extras");
+    g.json["nodes"][1]["extras"]["lens_radius"] = 0;
+    expect(g, 683, "");
+    g.json["scenes"][0]["extras"]["light_units"] = "candela";
+    EXPECT_THROW(load(g), Error);
+}
+
+TEST(LightUnits, OfTheCommandLineDecide) {
+    writeText(folder() / "scene.gltf", exported("", {{"point", 683}}).text());
+    const auto with = [](LightUnits units) {
+        return loadScene(folder() / "scene.gltf", {}, {}, {.lightUnits = units});
+    };
+    const Scene radiometric = with(LightUnits::Radiometric), photometric = with(LightUnits::Photometric);
+    EXPECT_EQ(radiometric.lights[0].intensity.x, 683);
+    EXPECT_EQ(photometric.lights[0].intensity.x, 1);
+    EXPECT_TRUE(radiometric.report.notes.empty());
+    EXPECT_EQ(photometric.report.lightUnits, LightUnits::Photometric);
+}
+
+/// Blender's spot of half the angle 0.5 and blend 0.3: by the smooth step of the cosine, up to version 3
+/// times the cosine.
+TEST(Spots, FadeAsTheFilesProgramMeansThem) {
+    const double outer = 0.5, inner = 0.5 * (1 - 0.3);
+    for (const auto& [generator, version] : {std::pair{"Khronos glTF Blender I/O v3.6.28", 3},
+                                             {"Khronos glTF Blender I/O v4.1.62", 4},
+                                             {"", 0}}) {
+        GltfText g = exported(generator, {{"spot", 1}});
+        g.json["extensions"]["KHR_lights_punctual"]["lights"][0]["spot"] = {{"innerConeAngle", inner},
+                                                                            {"outerConeAngle", outer}};
+        const Scene s = load(g);
+        for (const double angle : {0.0, 0.2, 0.36, 0.4, 0.42, 0.45, 0.49, 0.51}) {
+            const double cosine = std::cos(angle), edge = std::cos(outer);
+            double expected = std::clamp((cosine - edge) / (std::cos(inner) - edge), 0.0, 1.0);
+            expected *= expected;
+            if (version > 0) {
+                const double t = std::clamp((cosine - edge) / ((1 - edge) * 0.3), 0.0, 1.0);
+                expected = t * t * (3 - 2 * t) * (version < 4 ? cosine : 1);
+            }
+            const Vec3 away{static_cast<float>(std::sin(angle)), 0, static_cast<float>(-cosine)};
+            EXPECT_NEAR(s.lights[0].cone(away), expected, 2e-5) << generator << " " << angle;
+        }
+        EXPECT_EQ(s.materials[0].retro, version == 3);
+    }
 }
 
 TEST(LoadScene, EnvironmentFromExtrasOptionsAndImages) {
@@ -539,12 +640,20 @@ TEST(BadScene, NumbersThatAreNone) {
 }
 
 TEST(BadScene, NothingToSeeOrSeeBy) {
-    expectFailure("no camera", [](GltfText& g) { g.json["scenes"][0]["nodes"] = {0, 2}; });
     expectFailure("no light", [](GltfText& g) { g.json["scenes"][0]["nodes"] = {0, 1}; });
     expectFailure("no triangles", [](GltfText& g) { g.json["scenes"][0]["nodes"] = {1, 2}; });
     expectFailure("more than one parent", [](GltfText& g) { g.json["nodes"][0]["children"] = {0}; });
-    expectFailure("KHR_draco_mesh_compression",
-                  [](GltfText& g) { g.json["extensionsRequired"] = {"KHR_draco_mesh_compression"}; });
+    expectFailure("KHR_texture_basisu",
+                  [](GltfText& g) { g.json["extensionsRequired"] = {"KHR_texture_basisu"}; });
+}
+
+TEST(LoadScene, NeedsNoCameraButSaysWhyThereIsNone) {
+    GltfText g;
+    g.json["scenes"][0]["nodes"] = {0, 2};
+    EXPECT_NE(load(g).cameraFault.find("has no camera in its scene 0"), std::string::npos);
+    g.json["nodes"][1].erase("camera");
+    EXPECT_EQ(load(g).cameraFault, "has no camera");
+    EXPECT_EQ(load(GltfText()).cameraFault, "");
 }
 
 /// Every byte of the JSON part damaged in turn: an error or a scene, never a crash.

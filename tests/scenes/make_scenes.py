@@ -5,7 +5,8 @@ Usage: make_scenes.py FOLDER [NAME...]      (default: all; --list prints the nam
 
 Python 3 and its standard library only; the files' bytes depend on nothing but this script. Conventions are those of
 vlx-trace: metres, y up, radiometric units (point lights W/sr, emission is radiance), camera extras `lens_radius` and
-`focus_distance`, scene extras `env_constant`. Without one the background is black. Every picture is square.
+`focus_distance`, scene extras `light_units` and `env_constant`. Without the latter the background is black. Every
+picture is square.
 """
 
 import json
@@ -53,8 +54,8 @@ def png(width, height, pixel):
 class Scene:
     def __init__(self):
         self.json = {"asset": {"version": "2.0", "generator": "make_scenes.py"}, "scene": 0,
-                     "scenes": [{"nodes": []}], "nodes": [], "cameras": [], "materials": [], "meshes": [],
-                     "accessors": [], "bufferViews": []}
+                     "scenes": [{"nodes": [], "extras": {"light_units": "radiometric"}}], "nodes": [],
+                     "cameras": [], "materials": [], "meshes": [], "accessors": [], "bufferViews": []}
         self.bytes = b""
         self.triangles = 0
 
@@ -207,7 +208,7 @@ class Scene:
         self._node({"translation": list(position), "extensions": {"KHR_lights_punctual": {"light": len(lights) - 1}}})
 
     def environment(self, radiance):
-        self.json["scenes"][0]["extras"] = {"env_constant": list(radiance)}
+        self.json["scenes"][0]["extras"]["env_constant"] = list(radiance)
 
     def glb(self):
         self.json["buffers"] = [{"byteLength": len(self.bytes)}]

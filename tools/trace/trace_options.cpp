@@ -16,6 +16,8 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
         "  vlx-trace room.glb -o room.exr --width 640 --spp 32\n"
         "  vlx-trace room.glb -o room.exr --hierarchical --tolerance 0.05 --seed 7\n"
         "  vlx-trace house.gltf -o house.exr --env sky.exr --camera kitchen --crop 100,50,64,64\n"
+        "  vlx-trace chair.glb -o chair.exr --env-constant 1,1,1 --camera-position 2,1.5,2 --look-at "
+        "0,0.5,0\n"
         "  vlx-trace room.glb -o room_####.exr --frames 1-100 --band 2/5\n"
         "The dump is a deep OpenEXR file: its part `beauty` is the plain average, its part `samples` "
         "holds\n"
@@ -24,7 +26,24 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
     app.add_option("-o,--output", o.dump, "The dump to write (.exr)");
     app.add_option("--camera", o.camera,
                    "Name or number of the camera (default: the scene's active one, or the\n"
-                   "first that can be used)")
+                   "first that can be used, or one that is made: the whole scene, from 45 degrees to\n"
+                   "the right of its front (+z) and 22.5 up)")
+        ->type_name("NAME|INDEX");
+    const auto place = [&](const char* name, std::vector<float>& value, const char* help) {
+        app.add_option(name, value, help)->delimiter(',')->expected(3)->type_name("X,Y,Z");
+    };
+    place("--camera-position", o.position,
+          "Where the camera stands still, instead of where it is in the file (default of\n"
+          "--look-at: the middle of the scene)");
+    place("--look-at", o.target, "What is in the middle of the picture; y is up in it");
+    app.add_option("--fov", o.verticalDegrees,
+                   "The picture's vertical angle of view, in degrees (default: the camera's own; 45\n"
+                   "where one is made); makes an orthographic camera a perspective one")
+        ->check(finiteWithin(0.01, 179))
+        ->type_name("DEGREES");
+    app.add_option("--variant", o.variant,
+                   "Name or number of the variant of materials (KHR_materials_variants; default:\n"
+                   "none, the materials that the scene's meshes name themselves)")
         ->type_name("NAME|INDEX");
     app.add_flag("--list-cameras", o.listCameras, "Print the scene's cameras and exit");
     app.add_option("--width", o.width, "Of the picture, in pixels (default: 512, or from the height)")
@@ -94,6 +113,13 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
     app.add_option("--env", o.environment.image,
                    "Latitude-longitude image of the environment (EXR, HDR, ...); its middle is -z")
         ->excludes(constant);
+    addChoice(app, "--light-units", o.lightUnits,
+              {{"auto", LightUnits::Auto},
+               {"radiometric", LightUnits::Radiometric},
+               {"photometric", LightUnits::Photometric}},
+              "In what the file has its punctual lights. radiometric: W/sr and W/m2; photometric: cd and "
+              "lx, which are divided by 683 lm/W; auto: radiometric where its extras say so or Blender's "
+              "exporter shows it, otherwise photometric, and that is said");
     app.add_option("--effects", o.effects,
                    "What to simulate: auto, what the scene calls for; all, everything (the general\n"
                    "tracer, slower); auto,-NAME,... leaves effects out, which biases the image.\n"
@@ -152,16 +178,24 @@ void checkOptions(const TraceOptions& o) {
     const std::string atHand = o.listCameras ? "--list-cameras" : o.explain.empty() ? trace : explaining;
     checkOptionUse(*o.commandLine,
                    {{{"--output", "--overwrite", "--compression", "--json", "--band"}, {trace}},
-                    {{"--camera", "--width", "--height", "--crop", "--spp", "--hierarchical", "--tolerance",
-                      "--time", "--replicates", "--target-error", "--append", "--sample-map", "--seed",
-                      "--max-bounces", "--effects", "--integrator", "--explain"},
+                    {{"--camera",     "--variant",     "--camera-position", "--look-at",
+                      "--fov",        "--light-units", "--width",           "--height",
+                      "--crop",       "--spp",         "--hierarchical",    "--tolerance",
+                      "--time",       "--replicates",  "--target-error",    "--append",
+                      "--sample-map", "--seed",        "--max-bounces",     "--effects",
+                      "--integrator", "--explain"},
                      {trace, explaining}}},
                    {atHand});
     if (o.shutter.size() == 2 &&
         !(std::isfinite(o.shutter[0]) && std::isfinite(o.shutter[1]) && o.shutter[0] <= o.shutter[1]))
         throw CLI::ValidationError("--shutter", "expected two finite times, the second not before the first");
-    for (const float value : o.environmentConstant)
-        if (!std::isfinite(value)) throw CLI::ValidationError("--env-constant", "expected finite values");
+    const auto requireFinite = [](const char* name, const std::vector<float>& values) {
+        for (const float value : values)
+            if (!std::isfinite(value)) throw CLI::ValidationError(name, "expected finite values");
+    };
+    requireFinite("--env-constant", o.environmentConstant);
+    requireFinite("--camera-position", o.position);
+    requireFinite("--look-at", o.target);
     if (o.integrator == IntegratorRequest::Bidirectional && o.targetError > 0)
         throw CLI::ValidationError("--target-error", "judges by path tracing: not with bidirectional");
 }

@@ -16,11 +16,16 @@ struct TraceOptions {
     std::string scene;
     std::string dump;
     std::string camera;
+    std::vector<float> position;  // of the camera: three numbers, or none
+    std::vector<float> target;
+    float verticalDegrees = 0;  // 0: as the camera has it
+    std::string variant;
     int width = 0;
     int height = 0;
     std::vector<int> crop;
     std::vector<float> environmentConstant;
     EnvironmentOptions environment;
+    LightUnits lightUnits = LightUnits::Auto;
     int threads = 0;
     bool listCameras = false;
     bool json = false;

@@ -8,6 +8,7 @@
 #include "render/pilot/pilot.h"
 #include "tool_main.h"
 #include "variolux/base/parallel.h"
+#include "variolux/base/text.h"
 
 namespace vlx::render {
 
@@ -15,6 +16,10 @@ void note(const TraceOptions& o, const std::string& text) { say(o.scene + ": " +
 
 int printCameras(const TraceOptions& o, const Scene& loaded) {
     for (const std::string& warning : loaded.report.warnings) note(o, "warning: " + warning);
+    if (!loaded.cameraFault.empty())
+        note(o, loaded.cameraFault +
+                    ": one is made that has the whole scene in its picture, from 45 degrees to the right of "
+                    "the front (+z) and 22.5 up (--camera-position, --look-at and --fov place another)");
     for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
         const Camera& c = loaded.cameras[i];
         std::cout << i << "  " << c.name
@@ -67,6 +72,25 @@ int printSkipped(const TraceOptions& o) {
         std::cout << nlohmann::ordered_json{{"scene", o.scene}, {"dump", o.dump}, {"skipped", true}}.dump(2)
                   << "\n";
     return kDone;
+}
+
+void warnOfBrightness(const TraceOptions& o, const Scene& loaded, const RenderReport& report) {
+    constexpr double kBrightest = 100, kDarkest = 0.001;
+    const double mean = report.meanLuminance;
+    // A part of the picture may well be dark, and a scene without light was told of.
+    if (o.render.crop || o.render.band.count > 1 || !o.render.plan->lit()) return;
+    if (mean >= kDarkest && mean <= kBrightest) return;
+    const bool bright = mean > kBrightest;
+    const LightUnits units = loaded.report.lightUnits;
+    std::string remedy;
+    if (bright && units == LightUnits::Radiometric)
+        remedy = "--light-units photometric divides its lights by 683 lm/W";
+    else if (!bright && units == LightUnits::Photometric)
+        remedy = "--light-units radiometric takes its lights as they are, 683 times as strong";
+    else
+        remedy = bright ? "expose it accordingly" : "--env-constant 1,1,1 lights it from all around";
+    note(o, "warning: the picture's mean luminance is " + formatted("%.3g", mean) + ", " +
+                (bright ? "white" : "black") + " on a screen: " + remedy);
 }
 
 void summarize(const TraceOptions& o, const Scene& loaded, const RenderReport& report) {

@@ -16,6 +16,9 @@ int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, cons
 /// That the work was finished before.
 int printSkipped(const TraceOptions& o);
 
+/// Warns when the picture is far brighter or darker than screens show.
+void warnOfBrightness(const TraceOptions& o, const Scene& loaded, const RenderReport& report);
+
 void summarize(const TraceOptions& o, const Scene& loaded, const RenderReport& report);
 
 }  // namespace vlx::render

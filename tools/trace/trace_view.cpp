@@ -1,8 +1,11 @@
 #include "trace/trace_view.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <utility>
 
+#include "render/scene/camera_placement.h"
 #include "trace/trace_report.h"
 #include "variolux/base/error.h"
 
@@ -27,6 +30,8 @@ std::size_t chosenCamera(const TraceOptions& o, const Scene& loaded) {
     const bool isNumber =
         o.camera.find_first_not_of("0123456789") == std::string::npos && o.camera.size() < 9;
     if (isNumber && std::stoul(o.camera) < loaded.cameras.size()) return std::stoul(o.camera);
+    if (loaded.cameras.empty())
+        throw Error(o.scene, "has no camera '" + o.camera + "', and no other; without --camera one is made");
     std::string names;
     for (const Camera& c : loaded.cameras) names += (names.empty() ? "'" : ", '") + c.name + "'";
     throw Error(o.scene, "has no camera '" + o.camera + "'; it has " + names);
@@ -46,14 +51,74 @@ void setSize(TraceOptions& o, const Camera& chosen) {
     o.render.height = o.height;
 }
 
+/// As short as reads back as the same.
+std::string textOf(float value) {
+    char text[32];
+    return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
+std::string textOf(const Vec3& v) { return textOf(v.x) + "," + textOf(v.y) + "," + textOf(v.z); }
+
+std::pair<Vec3, Vec3> boxOf(const TraceOptions& o, const Scene& loaded, const Shutter& first) {
+    if (loaded.shapes.empty())
+        throw Error(o.scene,
+                    (loaded.cameraFault.empty() ? "" : loaded.cameraFault + "; and it ") +
+                        "has no triangles to place a camera by: give --camera-position and --look-at");
+    if (!o.frame) return {loaded.boundsMin, loaded.boundsMax};
+    const Scene start = loadScene(o.scene, o.environment, first, {o.lightUnits, o.variant});
+    return {start.boundsMin, start.boundsMax};
+}
+
 }  // namespace
 
-void chooseView(TraceOptions& o, const Scene& known) {
-    if (std::ranges::all_of(known.cameras, [](const Camera& c) { return !c.unusable.empty(); })) return;
-    o.render.camera = chosenCamera(o, known);
+void chooseView(TraceOptions& o, Scene known) {
+    if (o.camera.empty() && !known.cameraFault.empty()) {
+        o.render.camera = known.cameras.size();
+        known.cameras.emplace_back();
+    } else {
+        o.render.camera = chosenCamera(o, known);
+    }
     setSize(o, known.cameras[o.render.camera]);
     if (o.crop.size() == 4) o.render.crop = Window{o.crop[0], o.crop[1], o.crop[2], o.crop[3]};
     if (const auto fault = o.render.validate(known)) throw CLI::ValidationError(*fault);
+}
+
+void placeCamera(const TraceOptions& o, Scene& loaded, const Shutter& first) {
+    const bool made = o.render.camera == loaded.cameras.size();
+    const bool placed = !o.position.empty(), turned = !o.target.empty();
+    Viewpoint view;
+    if (o.verticalDegrees > 0) view.verticalDegrees = o.verticalDegrees;
+    if ((made || placed) && !(placed && turned)) {
+        const auto [low, high] = boxOf(o, loaded, first);
+        if (placed)
+            view.target = (low + high) * 0.5f;
+        else
+            view = framed(low, high, o.render.width / static_cast<double>(o.render.height),
+                          view.verticalDegrees);
+    }
+    if (placed) view.position = {o.position[0], o.position[1], o.position[2]};
+    if (turned) view.target = {o.target[0], o.target[1], o.target[2]};
+    if (made) {
+        loaded.cameras.emplace_back();
+        loaded.cameras.back().name = "made";
+    }
+    Camera& camera = loaded.cameras[o.render.camera];
+    if (made || o.verticalDegrees > 0) {
+        camera.verticalFov = view.verticalDegrees * (kPi / 180);
+        camera.orthographicHeight = 0;
+    }
+    const bool still = made || placed;
+    if (still ? view.position == view.target : turned && !turnTowards(camera, view.target))
+        throw CLI::ValidationError("--look-at",
+                                   "expected another place than the camera's, found " + textOf(view.target));
+    if (still) {
+        camera.motion = {};
+        camera.course.reset();
+        camera.toWorld = lookingAt(view.position, view.target);
+    }
+    if (made)
+        note(o, loaded.cameraFault + ": one is made, --camera-position " + textOf(view.position) +
+                    " --look-at " + textOf(view.target) + " --fov " + textOf(view.verticalDegrees));
 }
 
 void takeSizeOf(TraceOptions& o, const EarlierDump& earlier) {

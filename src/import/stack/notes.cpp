@@ -37,10 +37,10 @@ void notePreset(const StackPlan& plan, std::vector<std::string>& notes) {
         notes.push_back(
             "pbrt's gbuffer has positions, no distances: with its default coordinates, camera space, "
             "--map Z=P.Z takes the depth along the axis.");
-    if (plan.preset == StackPreset::Pbrt || plan.preset == StackPreset::Mitsuba)
+    if (plan.preset == StackPreset::Mitsuba)
         notes.push_back(
-            "Pixels of these renderers average samples with a filter: only a box filter of one pixel keeps "
-            "pixels independent.");
+            "Mitsuba's filters give a sample to several pixels: only a box filter of one keeps pixels "
+            "independent.");
 }
 
 void noteSamples(const std::vector<double>& ofImages, std::vector<std::string>& notes) {

@@ -15,7 +15,9 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <set>
 
+#include "exr/header_copy.h"
 #include "import/stack/cryptomatte.h"
 #include "variolux/base/error.h"
 #include "variolux/base/fingerprint.h"
@@ -101,15 +103,14 @@ Names cryptomattes(const Imf::Header& header) {
 }
 
 // The first image's, for a file of scanlines of these channels.
-Imf::Header fileHeader(Imf::Header header, const std::vector<Plane>& planes, const std::string& layer,
+Imf::Header fileHeader(const Imf::Header& first, const std::vector<Plane>& planes, const std::string& layer,
                        double samples, const std::string& inputs) {
-    for (const char* name : {"name", "type", "version", "chunkCount", "tiles", "view"}) header.erase(name);
-    Names times;  // of one image
-    for (auto it = header.begin(); it != header.end(); ++it)
+    std::set<std::string> left = {"name", "type", "version", "chunkCount", "tiles", "view"};
+    for (auto it = first.begin(); it != first.end(); ++it)  // times of one image
         if (const std::string name = it.name();
             name == "RenderTime" || (name.starts_with("cycles.") && name.ends_with("_time")))
-            times.push_back(name);
-    for (const std::string& name : times) header.erase(name);
+            left.insert(name);
+    Imf::Header header = headerWithout(first, left);
     const std::string ofLayer = "cycles." + layer + "samples";
     if (samples > 0 && header.findTypedAttribute<Imf::StringAttribute>(ofLayer))
         header.insert(ofLayer, Imf::StringAttribute(formatted("%.0f", samples)));

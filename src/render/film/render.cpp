@@ -27,6 +27,32 @@ PlanOptions planOptions(const RenderOptions& options) {
         options.camera, options.width, options.height, options.path.maxBounces, {.all = true, .without = {}}};
 }
 
+/// The sum over a band's pixels of the luminance of their means.
+double luminanceOf(const SampleBand& band) {
+    double sum = 0;
+    for (std::size_t p = 0; p < band.pixels(); ++p) {
+        const std::uint64_t first = band.offsets[p], end = band.offsets[p + 1];
+        double pixel = 0;
+        for (std::uint64_t s = first; s < end; ++s)
+            pixel +=
+                static_cast<double>(luminance(Rgb{band.values[0][s], band.values[1][s], band.values[2][s]}));
+        if (end > first) sum += pixel / static_cast<double>(end - first);
+    }
+    return sum;
+}
+
+/// The same of splats, whose replicates share the picture.
+double luminanceOf(SplatImages& splats) {
+    double sum = 0;
+    const Window& window = splats.data();
+    for (int r = 0; r < splats.replicates(); ++r)
+        for (int y = window.y; y < window.y + window.height; ++y)
+            for (int x = window.x; x < window.x + window.width; ++x)
+                sum += static_cast<double>(
+                    luminance(Rgb{splats.at(x, y, r, 0), splats.at(x, y, r, 1), splats.at(x, y, r, 2)}));
+    return sum / splats.replicates();
+}
+
 /// Of the whole picture, whatever the band.
 DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& options) {
     DumpHeader header;
@@ -200,6 +226,7 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     };
 
     RenderReport report;
+    double shone = 0;  // luminance of all pixels
     const std::clock_t cpuStart = std::clock();
     using Clock = std::chrono::steady_clock;
     for (int y = window.y; y < window.y + window.height;) {
@@ -208,6 +235,7 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
         SampleBand band = bands.trace({window.x, y, window.width, end - y}, regionDone);
         report.traceSeconds += std::chrono::duration<double>(Clock::now() - start).count();
         report.samples += band.samples();
+        shone += luminanceOf(band);
         if (splats) report.nonFinite += bands.addTo(*splats);
         for (const RegionResult& region : bands.regions()) {
             report.nonFinite += region.nonFinite;
@@ -221,6 +249,8 @@ RenderReport renderDump(const Scene& scene, const Accelerator& accelerator, cons
     // Merging adds the bands' seconds up: the first one has the earlier ones.
     const bool first = options.earlier != nullptr && options.band.index == 0;
     const double before = first ? options.earlier->header().renderSeconds.value_or(0) : 0;
+    if (splats) shone += luminanceOf(*splats);
+    report.meanLuminance = shone / static_cast<double>(window.pixels());
     if (splats) writer.writeSplats(std::move(*splats));
     writer.close(before + report.traceSeconds);
     report.writeCpuSeconds = writer.cpuSeconds();

@@ -51,6 +51,7 @@ struct RenderOptions {
 struct RenderReport {
     std::uint64_t samples = 0;
     std::uint64_t nonFinite = 0;  ///< samples (and splats) whose radiance overflowed: written as 0
+    double meanLuminance = 0;     ///< of the pixels that were traced, by the new samples (Rec. 709)
     double traceSeconds = 0;      ///< wall time of tracing
     double traceCpuSeconds = 0;   ///< processor time of the process, writing taken off
     double writeCpuSeconds = 0;   ///< processor time of compressing and writing

@@ -6,7 +6,7 @@
 namespace vlx::render {
 namespace {
 
-std::array<double, 4> slerp(const std::array<double, 4>& a, std::array<double, 4> b, double t) {
+std::vector<double> slerp(const std::vector<double>& a, std::vector<double> b, double t) {
     double cosine = 0;
     for (std::size_t i = 0; i < 4; ++i) cosine += a[i] * b[i];
     if (cosine < 0) {  // the shorter way round
@@ -17,12 +17,21 @@ std::array<double, 4> slerp(const std::array<double, 4>& a, std::array<double, 4
     const double sine = std::sin(angle);
     const double wa = sine > 1e-6 ? std::sin((1 - t) * angle) / sine : 1 - t;
     const double wb = sine > 1e-6 ? std::sin(t * angle) / sine : t;
-    std::array<double, 4> r{};
+    std::vector<double> r(4);
     for (std::size_t i = 0; i < 4; ++i) r[i] = wa * a[i] + wb * b[i];
     return r;
 }
 
 }  // namespace
+
+std::size_t morphTargets(const tinygltf::Model& model, std::size_t node) {
+    const int mesh = model.nodes[node].mesh;
+    if (mesh < 0 || static_cast<std::size_t>(mesh) >= model.meshes.size()) return 0;
+    std::size_t targets = 0;
+    for (const tinygltf::Primitive& p : model.meshes[static_cast<std::size_t>(mesh)].primitives)
+        targets = std::max(targets, p.targets.size());
+    return targets;
+}
 
 Transform placeOf(const Pose& pose) {
     const auto& q = pose.rotation;
@@ -57,9 +66,16 @@ void Animations::readChannel(std::size_t animation, std::size_t index) {
     if (node >= model.nodes.size())
         file_.fail(what + " refers to node " + std::to_string(node) + ", the file has " +
                    std::to_string(model.nodes.size()));
-    if (channel.target_path != "translation" && channel.target_path != "rotation" &&
-        channel.target_path != "scale") {
-        warnings_.push_back(what + " animates '" + channel.target_path + "': left at rest");
+    const std::map<std::string, Property> properties = {{"translation", Property::Translation},
+                                                        {"rotation", Property::Rotation},
+                                                        {"scale", Property::Scale},
+                                                        {"weights", Property::Weights}};
+    const auto property = properties.find(channel.target_path);
+    const std::size_t width = property == properties.end() ? 0 : widthOf(property->second, node);
+    if (width == 0) {
+        warnings_.push_back(what + " animates '" + channel.target_path + "'" +
+                            (property == properties.end() ? "" : " of a mesh without morph targets") +
+                            ": left at rest");
         return;
     }
     if (channel.sampler < 0 || static_cast<std::size_t>(channel.sampler) >= source.samplers.size())
@@ -67,15 +83,16 @@ void Animations::readChannel(std::size_t animation, std::size_t index) {
                    std::to_string(source.samplers.size()));
     const tinygltf::AnimationSampler& sampler = source.samplers[static_cast<std::size_t>(channel.sampler)];
     Channel out;
-    out.property = channel.target_path == "translation" ? Property::Translation
-                   : channel.target_path == "rotation"  ? Property::Rotation
-                                                        : Property::Scale;
+    out.property = property->second;
+    out.width = width;
     out.interpolation = sampler.interpolation == "STEP"          ? Interpolation::Step
                         : sampler.interpolation == "CUBICSPLINE" ? Interpolation::Cubic
                                                                  : Interpolation::Linear;
     const auto doubles = [](const std::vector<float>& v) { return std::vector<double>(v.begin(), v.end()); };
     out.times = doubles(file_.floats(sampler.input, 1, what + " times"));
-    out.values = doubles(file_.floats(sampler.output, static_cast<int>(out.width()), what + " values"));
+    const bool morphs = out.property == Property::Weights;  // whose values are single numbers
+    out.values =
+        doubles(file_.floats(sampler.output, morphs ? 1 : static_cast<int>(width), what + " values"));
     if (out.times.empty()) {
         warnings_.push_back(what + " has no keys: " + described("node", node, model.nodes[node].name) +
                             " is left at rest");
@@ -85,15 +102,24 @@ void Animations::readChannel(std::size_t animation, std::size_t index) {
         if (!std::isfinite(out.times[i]) || (i > 0 && !(out.times[i] > out.times[i - 1])))
             file_.fail(what + ": times must be finite and ascend, key " + std::to_string(i) + " is at " +
                        std::to_string(out.times[i]));
-    const std::size_t wanted =
-        out.times.size() * out.width() * (out.interpolation == Interpolation::Cubic ? 3 : 1);
+    const std::size_t wanted = out.times.size() * width * (out.interpolation == Interpolation::Cubic ? 3 : 1);
     if (out.values.size() != wanted)
-        file_.fail(what + " has " + std::to_string(out.values.size() / out.width()) + " values, expected " +
-                   std::to_string(wanted / out.width()) + " for " + std::to_string(out.times.size()) +
-                   " keys");
+        file_.fail(what + " has " + std::to_string(out.values.size() / (morphs ? 1 : width)) +
+                   " values, expected " + std::to_string(wanted / (morphs ? 1 : width)) + " for " +
+                   std::to_string(out.times.size()) + " keys");
     if (!std::ranges::all_of(out.values, [](double v) { return std::isfinite(v); }))
         file_.fail(what + " has values that are not finite");
 
+    const std::string twice = what + " animates what another channel does already: left out";
+    if (morphs) {
+        const bool first =
+            morphed_
+                .emplace(node, Morphed{name + " morphs " + described("node", node, model.nodes[node].name),
+                                       std::move(out)})
+                .second;
+        if (!first) warnings_.push_back(twice);
+        return;
+    }
     Animated& animated = nodes_[node];
     if (animated.channels.empty()) {
         const tinygltf::Node& n = model.nodes[node];
@@ -106,20 +132,25 @@ void Animations::readChannel(std::size_t animation, std::size_t index) {
     }
     if (std::ranges::any_of(animated.channels,
                             [&](const Channel& c) { return c.property == out.property; })) {
-        warnings_.push_back(what + " animates what another channel does already: left out");
+        warnings_.push_back(twice);
         return;
     }
     animated.channels.push_back(std::move(out));
 }
 
-std::array<double, 4> Animations::Channel::at(double seconds) const {
-    const std::size_t w = width();
+/// How many numbers a key has; 0: there is nothing to animate.
+std::size_t Animations::widthOf(Property property, std::size_t node) const {
+    if (property == Property::Weights) return morphTargets(file_.model(), node);
+    return property == Property::Rotation ? 4 : 3;
+}
+
+std::vector<double> Animations::Channel::at(double seconds) const {
+    const std::size_t w = width;
     const bool cubic = interpolation == Interpolation::Cubic;
     const std::size_t stride = cubic ? 3 * w : w;
     const auto value = [&](std::size_t key, std::size_t part) {
-        std::array<double, 4> v{};
-        for (std::size_t i = 0; i < w; ++i) v[i] = values[key * stride + part * w + i];
-        return v;
+        const auto first = values.begin() + static_cast<std::ptrdiff_t>(key * stride + part * w);
+        return std::vector<double>(first, first + static_cast<std::ptrdiff_t>(w));
     };
     const std::size_t middle = cubic ? 1 : 0;
     const auto after = std::ranges::upper_bound(times, seconds);
@@ -131,7 +162,7 @@ std::array<double, 4> Animations::Channel::at(double seconds) const {
     const auto a = value(next - 1, middle), b = value(next, middle);
     if (interpolation == Interpolation::Step) return a;
     if (!cubic && property == Property::Rotation) return slerp(a, b, t);
-    std::array<double, 4> r{};
+    std::vector<double> r(w);
     if (!cubic) {
         for (std::size_t i = 0; i < w; ++i) r[i] = a[i] * (1 - t) + b[i] * t;
         return r;
@@ -153,16 +184,27 @@ Transform Animations::local(std::size_t node, double seconds) const {
     const Animated& animated = nodes_.at(node);
     Pose pose = animated.rest;
     for (const Channel& channel : animated.channels) {
-        const std::array<double, 4> v = channel.at(seconds);
+        const std::vector<double> v = channel.at(seconds);
         if (channel.property == Property::Rotation) {
             const bool none = v[0] == 0 && v[1] == 0 && v[2] == 0 && v[3] == 0;
-            if (!none) pose.rotation = v;
+            if (!none) std::copy(v.begin(), v.end(), pose.rotation.begin());
         } else {
             auto& target = channel.property == Property::Translation ? pose.translation : pose.scale;
             std::copy(v.begin(), v.begin() + 3, target.begin());
         }
     }
     return placeOf(pose);
+}
+
+std::string Animations::morphCauseOf(std::size_t node) const {
+    const auto found = morphed_.find(node);
+    return found == morphed_.end() ? "" : found->second.cause;
+}
+
+std::optional<std::vector<double>> Animations::weights(std::size_t node, double seconds) const {
+    const auto found = morphed_.find(node);
+    if (found == morphed_.end()) return std::nullopt;
+    return found->second.channel.at(seconds);
 }
 
 }  // namespace vlx::render

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,13 +21,16 @@ struct Pose {
 /// First scaled, then rotated (the quaternion need not be of unit length, but not 0), then moved.
 Transform placeOf(const Pose& pose);
 
-/// The animations of a glTF file, all played at once: where nodes are at a time. Before the first and after
-/// the last key a node stays where that key puts it.
+/// How many morph targets the mesh of a node has; 0 without a mesh.
+std::size_t morphTargets(const tinygltf::Model& model, std::size_t node);
+
+/// The animations of a glTF file, all played at once: where nodes are at a time, and how far the targets of
+/// their meshes are morphed. Before the first and after the last key all stays as that key has it.
 class Animations {
   public:
-    /// Reads all channels. Channels without keys, of morph weights, and second ones for the same property are
-    /// left out, with a warning. Throws Error on references out of range, times that are not finite or do not
-    /// ascend, and values that are too few or not finite.
+    /// Reads all channels. Channels without keys, of weights that nothing has, and second ones for the same
+    /// property are left out, with a warning. Throws Error on references out of range, times that are not
+    /// finite or do not ascend, and values that are too few or not finite.
     Animations(const GltfFile& file, std::vector<std::string>& warnings);
 
     /// The animation and node in words: empty when no animation moves the node.
@@ -34,27 +38,38 @@ class Animations {
     /// The node's own transform at `seconds`, the rest pose where no channel says otherwise.
     Transform local(std::size_t node, double seconds) const;
 
+    /// The animation of a node's morph weights in words: empty when there is none.
+    std::string morphCauseOf(std::size_t node) const;
+    /// The weights of its mesh's targets, where an animation gives them.
+    std::optional<std::vector<double>> weights(std::size_t node, double seconds) const;
+
   private:
-    enum class Property { Translation, Rotation, Scale };
+    enum class Property { Translation, Rotation, Scale, Weights };
     enum class Interpolation { Linear, Step, Cubic };
     struct Channel {
         Property property;
         Interpolation interpolation;
         std::vector<double> times;
-        std::vector<double> values;  ///< width() a key; cubic: in-tangent, value and out-tangent
-        std::size_t width() const { return property == Property::Rotation ? 4 : 3; }
-        std::array<double, 4> at(double seconds) const;
+        std::vector<double> values;  ///< `width` a key; cubic: in-tangent, value and out-tangent
+        std::size_t width = 3;
+        std::vector<double> at(double seconds) const;
     };
     struct Animated {
         Pose rest;
         std::string cause;
         std::vector<Channel> channels;
     };
+    struct Morphed {
+        std::string cause;
+        Channel channel;
+    };
     void readChannel(std::size_t animation, std::size_t channel);
+    std::size_t widthOf(Property property, std::size_t node) const;
 
     const GltfFile& file_;
     std::vector<std::string>& warnings_;
     std::map<std::size_t, Animated> nodes_;
+    std::map<std::size_t, Morphed> morphed_;
 };
 
 }  // namespace vlx::render

@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 namespace vlx::render {
 namespace {
@@ -39,6 +40,15 @@ std::string faultOf(const tinygltf::PerspectiveCamera& p, bool zeroAspect) {
     return {};
 }
 
+/// The same of an orthographic one.
+std::string faultOf(const tinygltf::OrthographicCamera& o) {
+    for (const auto& [name, half] : {std::pair{"xmag", o.xmag}, std::pair{"ymag", o.ymag}})
+        if (!(half > 0 && std::isfinite(2 * static_cast<float>(half)))) return is(name, half, "more than 0");
+    if (const double aspect = o.xmag / o.ymag; !(aspect >= 1 / kMostSide && aspect <= kMostSide))
+        return is("xmag / ymag", aspect, "2^-20 to 2^20");
+    return {};
+}
+
 }  // namespace
 
 Camera readCamera(const GltfFile& file, const tinygltf::Node& node, const Transform& toWorld,
@@ -47,8 +57,12 @@ Camera readCamera(const GltfFile& file, const tinygltf::Node& node, const Transf
     const tinygltf::Camera& source = file.model().cameras[index];
     Camera camera;
     camera.name = node.name.empty() ? source.name : node.name;
-    if (source.type != "perspective") {
-        camera.unusable = "it is not a perspective camera";
+    if (source.type == "orthographic") {
+        camera.unusable = faultOf(source.orthographic);
+        camera.orthographicHeight = static_cast<float>(2 * source.orthographic.ymag);
+        camera.aspect = static_cast<float>(source.orthographic.xmag / source.orthographic.ymag);
+    } else if (source.type != "perspective") {
+        camera.unusable = "it is neither perspective nor orthographic";
     } else {
         camera.unusable = faultOf(source.perspective, file.zeroAspect(index));
         camera.verticalFov = static_cast<float>(source.perspective.yfov);

@@ -13,10 +13,4 @@ namespace vlx::render {
 /// Returns which cameras have an aspectRatio of 0: tinygltf takes that for none.
 std::vector<bool> checkGltf(const std::string& file, const std::string& text);
 
-/// What to do about an extension that is not supported, for messages: "; ..." or nothing.
-std::string remedyFor(const std::string& extension);
-
-/// Whether the tracer reads it.
-bool isSupported(const std::string& extension);
-
 }  // namespace vlx::render

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "render/gltf/gltf_check.h"
+#include "render/gltf/gltf_compressed.h"
 #include "render/gltf/gltf_references.h"
 #include "variolux/base/error.h"
 
@@ -51,15 +52,9 @@ void checkChunks(const std::string& path, const std::vector<unsigned char>& byte
         throw Error(path, "a chunk of the binary glTF file is longer than the file");
 }
 
-/// A text or binary glTF file with what the cameras of the file `path` need.
-std::vector<unsigned char> readCameras(const std::string& path) {
-    std::string text = camerasAlone(gltfJson(path));
-    if (text.empty()) return readBytes(path);  // which says what is wrong
-    // Its own buffer, when it has one, is the binary file's.
-    const bool buffered = text.find("\"buffers\"") != std::string::npos;
-    const std::vector<unsigned char> whole = buffered ? readBytes(path) : std::vector<unsigned char>();
+/// A text or binary glTF file, whose chunks have been checked, with another JSON.
+std::vector<unsigned char> withJson(const std::vector<unsigned char>& whole, std::string text) {
     if (!isBinary(whole)) return {text.begin(), text.end()};
-    checkChunks(path, whole);
     text.resize((text.size() + 3) / 4 * 4, ' ');
     const std::size_t rest = 20 + std::size_t{word(whole, 12)};
     std::vector<unsigned char> bytes(whole.begin(), whole.begin() + 20);
@@ -72,6 +67,17 @@ std::vector<unsigned char> readCameras(const std::string& path) {
     bytes.insert(bytes.end(), text.begin(), text.end());
     bytes.insert(bytes.end(), whole.begin() + static_cast<std::ptrdiff_t>(rest), whole.end());
     return bytes;
+}
+
+/// A text or binary glTF file with what the cameras of the file `path` need.
+std::vector<unsigned char> readCameras(const std::string& path) {
+    const std::string text = camerasAlone(gltfJson(path));
+    if (text.empty()) return readBytes(path);  // which says what is wrong
+    // Its own buffer, when it has one, is the binary file's.
+    const bool buffered = text.find("\"buffers\"") != std::string::npos;
+    const std::vector<unsigned char> whole = buffered ? readBytes(path) : std::vector<unsigned char>();
+    if (isBinary(whole)) checkChunks(path, whole);
+    return withJson(whole, text);
 }
 
 /// Images of their own files are kept encoded; those in buffers are read from there when wanted.
@@ -114,24 +120,26 @@ double component(const unsigned char* bytes, int type, bool normalized) {
 }  // namespace
 
 GltfFile::GltfFile(const std::string& path, Use use) : path_(path) {
-    const std::vector<unsigned char> bytes = use == Use::Scene ? readBytes(path) : readCameras(path);
+    std::vector<unsigned char> bytes = use == Use::Scene ? readBytes(path) : readCameras(path);
+    const bool binary = isBinary(bytes);
+    if (binary) checkChunks(path, bytes);
+    const std::string json(reinterpret_cast<const char*>(bytes.data()) + (binary ? 20 : 0),
+                           binary ? word(bytes, 12) : bytes.size());
+    zeroAspects_ = checkGltf(path, json);
+    if (std::string plain = withCompressedViews(json); plain != json)
+        bytes = withJson(bytes, std::move(plain));
     tinygltf::TinyGLTF loader;
     loader.SetImageLoader(keepEncoded, nullptr);
     const std::size_t slash = path.find_last_of('/');
     const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash);
     const auto size = static_cast<unsigned int>(bytes.size());
-    const auto* text = reinterpret_cast<const char*>(bytes.data());
     std::string errors, warnings;
-    bool good = false;
-    if (isBinary(bytes)) {
-        checkChunks(path, bytes);
-        zeroAspects_ = checkGltf(path, {text + 20, word(bytes, 12)});
-        good = loader.LoadBinaryFromMemory(&model_, &errors, &warnings, bytes.data(), size, folder);
-    } else {
-        zeroAspects_ = checkGltf(path, {text, bytes.size()});
-        good = loader.LoadASCIIFromString(&model_, &errors, &warnings, text, size, folder);
-    }
+    const bool good =
+        binary ? loader.LoadBinaryFromMemory(&model_, &errors, &warnings, bytes.data(), size, folder)
+               : loader.LoadASCIIFromString(&model_, &errors, &warnings,
+                                            reinterpret_cast<const char*>(bytes.data()), size, folder);
     if (!good) fail(firstLine(errors));
+    decompress();
 }
 
 void GltfFile::fail(const std::string& message) const { throw Error(path_, message); }
@@ -241,13 +249,13 @@ std::vector<float> GltfFile::colours(int index, const std::string& what) const {
     return rgba;
 }
 
-std::vector<std::uint32_t> GltfFile::indices(int index, const std::string& what) const {
+std::vector<std::uint32_t> GltfFile::indices(int index, const std::string& what, int components) const {
     const tinygltf::Accessor& a = accessorAt(index, what);
     if (a.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE &&
         a.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
         a.componentType != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
         fail(what + ": accessor " + std::to_string(index) + " must hold unsigned integers");
-    const std::vector<double> v = values(index, 1, what);
+    const std::vector<double> v = values(index, components, what);
     return {v.begin(), v.end()};
 }
 

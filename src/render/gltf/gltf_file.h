@@ -3,6 +3,7 @@
 #include <tiny_gltf.h>
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,7 +20,8 @@ class GltfFile {
     /// What is wanted of a file; the rest is not read, and may be broken.
     enum class Use { Scene, Cameras };
 
-    /// Parses the file and loads its buffers; images stay encoded.
+    /// Parses the file, loads its buffers, and decodes those that meshopt or Draco has compressed; images
+    /// stay encoded.
     explicit GltfFile(const std::string& path, Use use = Use::Scene);
 
     const std::string& path() const { return path_; }
@@ -34,11 +36,11 @@ class GltfFile {
     std::vector<float> floats(int accessor, int components, const std::string& what) const;
     /// The same for vectors of 3 or 4 components (colours): 4 floats each, the fourth 1 when missing.
     std::vector<float> colours(int accessor, const std::string& what) const;
-    /// The values of a scalar accessor of unsigned integers.
-    std::vector<std::uint32_t> indices(int accessor, const std::string& what) const;
+    /// The values of an accessor of unsigned integers, `components` each.
+    std::vector<std::uint32_t> indices(int accessor, const std::string& what, int components = 1) const;
 
-    /// The image decoded, four channels.
-    Texture image(int index, ColourSpace space) const;
+    /// The image decoded, four channels. `glossiness`: green becomes the roughness, 1 - it x alpha.
+    Texture image(int index, ColourSpace space, std::optional<float> glossiness = {}) const;
 
   private:
     struct Elements;
@@ -48,6 +50,10 @@ class GltfFile {
                                            std::size_t stride, std::size_t size,
                                            const std::string& what) const;
     std::vector<double> values(int accessor, int components, const std::string& what) const;
+    // gltf_compressed.cpp: compressed bufferViews and primitives are made plain ones.
+    void decompress();
+    void decodeMeshopt();
+    void decodeDraco(tinygltf::Primitive& primitive, const std::string& what);
 
     std::string path_;
     std::vector<bool> zeroAspects_;

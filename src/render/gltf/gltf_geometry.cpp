@@ -1,24 +1,59 @@
 #include "render/gltf/gltf_geometry.h"
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
+
+#include "render/gltf/gltf_variants.h"
 
 namespace vlx::render {
 namespace {
 
-int attribute(const tinygltf::Primitive& primitive, const char* name) {
+int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
     const auto found = primitive.attributes.find(name);
     return found == primitive.attributes.end() ? -1 : found->second;
 }
 
-Vec3 vec3At(const std::vector<float>& values, std::size_t i) {
-    return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+constexpr std::uint32_t kMostSteps = 16;
+constexpr float kTolerance = 1e-3f;
+
+/// The greatest way that a vertex has from one of two blocks to the other, or from the middle between two.
+float greatestWay(const VertexBlock& a, const VertexBlock& b) {
+    float way = 0;
+    for (std::size_t i = 0; i < a.positions.size(); ++i)
+        way = std::max(way, maxComponent(absolute(b.positions[i] - a.positions[i])));
+    return way;
+}
+float offMiddle(const VertexBlock& a, const VertexBlock& middle, const VertexBlock& b) {
+    float off = 0;
+    for (std::size_t i = 0; i < a.positions.size(); ++i)
+        off = std::max(
+            off, maxComponent(absolute((a.positions[i] + b.positions[i]) * 0.5f - middle.positions[i])));
+    return off;
 }
 
-/// A unit vector, or zero where the input has none (the triangle's own normal is taken then).
-Vec3 unitOrZero(const Vec3& v) {
-    const float norm = length(v);
-    return norm > 1e-30f && std::isfinite(norm) ? v / norm : Vec3{};
+/// Blocks at equal steps of time from 0 to 1; a single one, of the middle, where nothing moves.
+std::vector<VertexBlock> followedBlocks(const std::function<VertexBlock(double)>& at) {
+    std::vector<VertexBlock> blocks{at(0), at(0.5), at(1)};
+    for (;;) {
+        const std::size_t steps = blocks.size() - 1;
+        std::vector<VertexBlock> finer;
+        float extent = 0, off = 0;
+        for (std::size_t i = 0; i < steps; ++i) {
+            finer.push_back(at((static_cast<double>(i) + 0.5) / static_cast<double>(steps)));
+            off = std::max(off, offMiddle(blocks[i], finer.back(), blocks[i + 1]));
+            extent = std::max(
+                {extent, greatestWay(blocks[0], blocks[i + 1]), greatestWay(blocks[0], finer.back())});
+        }
+        if (extent == 0) return {blocks[steps / 2]};
+        if (off <= kTolerance * extent || steps >= kMostSteps) return blocks;
+        std::vector<VertexBlock> both{std::move(blocks[0])};
+        for (std::size_t i = 0; i < steps; ++i) {
+            both.push_back(std::move(finer[i]));
+            both.push_back(std::move(blocks[i + 1]));
+        }
+        blocks = std::move(both);
+    }
 }
 
 /// Whether a triangle has no area in float: corners that coincide or lie on a line.
@@ -59,7 +94,87 @@ std::vector<std::uint32_t> GeometryReader::triangleIndices(const tinygltf::Primi
     return corners;
 }
 
-void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Transform& toWorld,
+/// What a mesh is read for.
+struct GeometryReader::Use {
+    BendAt at;
+    bool bends = false;
+    bool sequence = false;
+    std::string cause;
+    std::size_t joints = 0;
+};
+
+std::uint32_t GeometryReader::materialOf(const tinygltf::Primitive& primitive,
+                                         const std::string& what) const {
+    const auto materials = static_cast<int>(scene_.materials.size());  // the last one is the default
+    const int material = materialIn(primitive, variant_);
+    if (material >= materials - 1)
+        file_.fail(what + " refers to material " + std::to_string(material) + ", the file has " +
+                   std::to_string(materials - 1));
+    return static_cast<std::uint32_t>(material < 0 ? materials - 1 : material);
+}
+
+std::vector<VertexBlock> GeometryReader::blocksOf(const PrimitiveVertices& vertices, const Use& use,
+                                                  Deformation& deformation) const {
+    if (!use.bends) return {vertices.at(use.at(0, 0.5))};
+    const auto follow = [&](int frame) {
+        return followedBlocks([&](double time) { return vertices.at(use.at(frame, time)); });
+    };
+    std::vector<VertexBlock> blocks = follow(0);
+    deformation.steps = static_cast<std::uint32_t>(blocks.size());
+    if (!use.sequence) return blocks;
+    std::vector<VertexBlock> before = follow(-1), after = follow(1);
+    const std::size_t steps = std::max({blocks.size(), before.size(), after.size()});
+    const auto resampled = [&](int frame) {
+        std::vector<VertexBlock> list;
+        for (std::size_t i = 0; i < steps; ++i)
+            list.push_back(vertices.at(
+                use.at(frame, steps == 1 ? 0.5 : static_cast<double>(i) / static_cast<double>(steps - 1))));
+        return list;
+    };
+    if (before.size() != steps) before = resampled(-1);
+    if (after.size() != steps) after = resampled(1);
+    float way = 0;
+    for (std::size_t i = 0; i < steps; ++i) {
+        const VertexBlock& own = blocks[blocks.size() == 1 ? 0 : std::min(i, blocks.size() - 1)];
+        if (blocks.size() == steps || blocks.size() == 1)
+            way = std::max({way, greatestWay(own, before[i]), greatestWay(own, after[i])});
+        else
+            way = 1;  // the neighbours move otherwise
+    }
+    if (way == 0) return blocks;
+    deformation.neighbourSteps = static_cast<std::uint32_t>(steps);
+    for (auto* list : {&before, &after})
+        for (VertexBlock& block : *list) blocks.push_back(std::move(block));
+    return blocks;
+}
+
+/// Those that the material's textures use; where the primitive has no such set, its first.
+void GeometryReader::readFurtherUvs(const tinygltf::Primitive& primitive, Shape& shape,
+                                    const std::string& what) {
+    const std::vector<int>& sets = scene_.materials[shape.material].furtherUvSets;
+    if (sets.empty()) return;
+    shape.firstFurtherUv = static_cast<std::int64_t>(scene_.furtherUvs.size());
+    for (const int set : sets) {
+        const std::string name = "TEXCOORD_" + std::to_string(set);
+        const int accessor = attribute(primitive, name);
+        std::vector<float> uvs;
+        if (accessor >= 0) {
+            uvs = file_.floats(accessor, 2, what + " " + name);
+            if (uvs.size() != 2 * std::size_t{shape.vertices})
+                file_.fail(what + " " + name + " has " + std::to_string(uvs.size() / 2) +
+                           " elements, POSITION " + std::to_string(shape.vertices));
+        } else {
+            scene_.report.warnings.push_back(what + " has no " + name +
+                                             ", which its material uses: TEXCOORD_0 is taken");
+        }
+        for (std::uint32_t i = 0; i < shape.vertices; ++i)
+            scene_.furtherUvs.push_back(accessor < 0
+                                            ? scene_.vertices[shape.firstVertex + i].uv
+                                            : Vec2{uvs[2 * std::size_t{i}], uvs[2 * std::size_t{i} + 1]});
+    }
+}
+
+void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Use& use,
                                    std::vector<Shape>& out) {
     const tinygltf::Mesh& source = file_.model().meshes[mesh];
     const tinygltf::Primitive& primitive = source.primitives[index];
@@ -69,28 +184,22 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Tr
         scene_.report.warnings.push_back(what + ": points and lines are left out");
         return;
     }
-    if (!primitive.targets.empty())
-        scene_.report.warnings.push_back(what + ": morph targets are left at rest");
-
-    const int positionAccessor = attribute(primitive, "POSITION");
-    if (positionAccessor < 0) file_.fail(what + " has no POSITION");
-    const std::vector<float> positions = file_.floats(positionAccessor, 3, what + " POSITION");
-    const std::size_t count = positions.size() / 3;
-    if (scene_.vertices.size() + count > std::numeric_limits<std::uint32_t>::max())
+    const PrimitiveVertices vertices(file_, primitive, use.joints, what);
+    const std::size_t count = vertices.count();
+    if (use.joints > 0 && !vertices.skinned())
+        scene_.report.warnings.push_back(what + " has no JOINTS_0: it stays where its node is");
+    Deformation deformation;
+    deformation.cause = use.cause;
+    const std::vector<VertexBlock> blocks = blocksOf(vertices, use, deformation);
+    if (scene_.vertices.size() + count * blocks.size() > std::numeric_limits<std::uint32_t>::max())
         file_.fail("more than 2^32 vertices");
-    const auto optional = [&](const char* name, int components) {
-        const int accessor = attribute(primitive, name);
-        if (accessor < 0) return std::vector<float>();
-        std::vector<float> v = file_.floats(accessor, components, what + " " + name);
-        if (v.size() != count * static_cast<std::size_t>(components))
-            file_.fail(what + " " + name + " has " +
-                       std::to_string(v.size() / static_cast<std::size_t>(components)) +
-                       " elements, POSITION " + std::to_string(count));
-        return v;
-    };
-    const std::vector<float> normals = optional("NORMAL", 3), uvs = optional("TEXCOORD_0", 2),
-                             secondUvs = optional("TEXCOORD_1", 2), tangents = optional("TANGENT", 4);
-    std::vector<float> colours;
+    std::vector<float> uvs, colours;
+    if (const int accessor = attribute(primitive, "TEXCOORD_0"); accessor >= 0) {
+        uvs = file_.floats(accessor, 2, what + " TEXCOORD_0");
+        if (uvs.size() != 2 * count)
+            file_.fail(what + " TEXCOORD_0 has " + std::to_string(uvs.size() / 2) + " elements, POSITION " +
+                       std::to_string(count));
+    }
     if (const int accessor = attribute(primitive, "COLOR_0"); accessor >= 0) {
         colours = file_.colours(accessor, what + " COLOR_0");
         if (colours.size() != 4 * count) file_.fail(what + " COLOR_0 has another size than POSITION");
@@ -100,28 +209,29 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Tr
     shape.firstVertex = static_cast<std::uint32_t>(scene_.vertices.size());
     shape.vertices = static_cast<std::uint32_t>(count);
     shape.firstTriangle = static_cast<std::uint32_t>(scene_.triangles.size());
-    const auto materials = static_cast<int>(scene_.materials.size());  // the last one is the default
-    if (primitive.material >= materials - 1)
-        file_.fail(what + " refers to material " + std::to_string(primitive.material) + ", the file has " +
-                   std::to_string(materials - 1));
-    shape.material = static_cast<std::uint32_t>(primitive.material < 0 ? materials - 1 : primitive.material);
+    shape.material = materialOf(primitive, what);
 
-    for (std::size_t i = 0; i < count; ++i) {
-        Vertex v;
-        v.position = toWorld.point(vec3At(positions, i));
-        if (!isFinite(v.position)) file_.fail(what + ": vertex " + std::to_string(i) + " is not finite");
-        if (!normals.empty()) v.normal = unitOrZero(toWorld.normal(unitOrZero(vec3At(normals, i))));
-        if (!uvs.empty()) v.uv = {uvs[2 * i], uvs[2 * i + 1]};
-        scene_.vertices.push_back(v);
+    for (const VertexBlock& block : blocks) {
+        for (std::size_t i = 0; i < count; ++i) {
+            Vertex v;
+            v.position = block.positions[i];
+            if (!block.normals.empty()) v.normal = block.normals[i];
+            if (!uvs.empty()) v.uv = {uvs[2 * i], uvs[2 * i + 1]};
+            scene_.vertices.push_back(v);
+        }
     }
-    const bool mirrored = toWorld.determinant() < 0;
     const auto corners = triangleIndices(primitive, shape.vertices, what);
     for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
         std::array<std::uint32_t, 3> t{corners[i], corners[i + 1], corners[i + 2]};
-        if (mirrored) std::swap(t[1], t[2]);
+        if (blocks[0].mirrored[t[0]]) std::swap(t[1], t[2]);
         for (std::uint32_t& corner : t) corner += shape.firstVertex;
-        if (degenerate(scene_.vertices[t[0]].position, scene_.vertices[t[1]].position,
-                       scene_.vertices[t[2]].position)) {
+        // Where it deforms: at all times.
+        bool flat = true;
+        for (std::uint32_t step = 0; step < deformation.steps && flat; ++step) {
+            const Vertex* first = scene_.vertices.data() + std::size_t{step} * count;
+            flat = degenerate(first[t[0]].position, first[t[1]].position, first[t[2]].position);
+        }
+        if (flat) {
             ++scene_.report.degenerateTriangles;
             continue;
         }
@@ -132,19 +242,13 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Tr
         scene_.vertices.resize(shape.firstVertex);
         return;
     }
-    if (!tangents.empty()) {
+    if (!blocks[0].tangents.empty()) {
         shape.firstTangent = static_cast<std::int64_t>(scene_.tangents.size());
-        for (std::size_t i = 0; i < count; ++i) {
-            const float* t = &tangents[4 * i];
-            const float sign = (t[3] < 0) != mirrored ? -1.f : 1.f;
-            scene_.tangents.push_back({unitOrZero(toWorld.vector({t[0], t[1], t[2]})), sign});
-        }
+        for (std::uint32_t step = 0; step < deformation.steps; ++step)
+            scene_.tangents.insert(scene_.tangents.end(), blocks[step].tangents.begin(),
+                                   blocks[step].tangents.end());
     }
-    if (!secondUvs.empty()) {
-        shape.firstSecondUv = static_cast<std::int64_t>(scene_.secondUvs.size());
-        for (std::size_t i = 0; i < count; ++i)
-            scene_.secondUvs.push_back({secondUvs[2 * i], secondUvs[2 * i + 1]});
-    }
+    readFurtherUvs(primitive, shape, what);
     if (!colours.empty()) {
         shape.firstColour = static_cast<std::int64_t>(scene_.colours.size());
         for (std::size_t i = 0; i < count; ++i) {
@@ -152,13 +256,28 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Tr
             scene_.colours.push_back({{c[0], c[1], c[2]}, c[3]});
         }
     }
+    if (blocks.size() > 1) {
+        shape.deformation = static_cast<std::int32_t>(scene_.deformations.size());
+        scene_.deformations.push_back(std::move(deformation));
+    }
     out.push_back(shape);
 }
 
 std::vector<Shape> GeometryReader::read(std::size_t mesh, const Transform& toWorld) {
+    const tinygltf::Mesh& source = file_.model().meshes[mesh];
+    Use use;
+    use.at = [&](int, double) { return Bend{restWeights(source), {}, toWorld}; };
+    std::vector<Shape> out;
+    for (std::size_t i = 0; i < source.primitives.size(); ++i) readPrimitive(mesh, i, use, out);
+    return out;
+}
+
+std::vector<Shape> GeometryReader::readBent(std::size_t mesh, const BendAt& at, bool sequence,
+                                            const std::string& cause) {
+    const Use use{at, true, sequence, cause, at(0, 0.5).joints.size()};
     std::vector<Shape> out;
     for (std::size_t i = 0; i < file_.model().meshes[mesh].primitives.size(); ++i)
-        readPrimitive(mesh, i, toWorld, out);
+        readPrimitive(mesh, i, use, out);
     return out;
 }
 

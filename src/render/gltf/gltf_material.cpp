@@ -1,6 +1,8 @@
 #include "render/gltf/gltf_material.h"
 
-#include "render/gltf/gltf_check.h"
+#include <algorithm>
+
+#include "render/gltf/gltf_extensions.h"
 
 namespace vlx::render {
 namespace {
@@ -42,6 +44,11 @@ Rgb absorption(const tinygltf::Value& volume) {
     return {coefficient(kept.x), coefficient(kept.y), coefficient(kept.z)};
 }
 
+/// The number of a set of coordinates; no file has as many as the greatest.
+int setIn(const tinygltf::Value& object, int fallback) {
+    return static_cast<int>(std::min(number(object, "texCoord", fallback), 1e9));
+}
+
 Wrap wrapOf(int mode) {
     if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::Clamp;
     if (mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT) return Wrap::Mirror;
@@ -58,10 +65,32 @@ void applyTransform(TextureRef& ref, const tinygltf::Value& transform) {
     ref.rowU = {static_cast<float>(c * sx), static_cast<float>(s * sy)};
     ref.rowV = {static_cast<float>(-s * sx), static_cast<float>(c * sy)};
     if (offset.size() == 2) ref.offset = {static_cast<float>(offset[0]), static_cast<float>(offset[1])};
-    ref.uvSet = static_cast<int>(number(transform, "texCoord", ref.uvSet));
 }
 
 }  // namespace
+
+/// The image and the sampler of a texture.
+Texture MaterialReader::load(const tinygltf::Texture& source, int index, ColourSpace space,
+                             const std::string& what, std::optional<float> glossiness) const {
+    const auto& samplers = file_.model().samplers;
+    int image = source.source;
+    if (const tinygltf::Value* webp = extension(source.extensions, "EXT_texture_webp"))
+        image = static_cast<int>(number(*webp, "source", image));
+    if (image < 0) {
+        std::string only;
+        for (const auto& [name, value] : source.extensions)
+            if (!isSupported(name)) only += ", only one of " + name + remedyFor(name);
+        file_.fail(what + " uses texture " + std::to_string(index) + ", which has no source" + only);
+    }
+    Texture loaded = file_.image(image, space, glossiness);
+    if (source.sampler >= 0 && static_cast<std::size_t>(source.sampler) < samplers.size()) {
+        const tinygltf::Sampler& sampler = samplers[static_cast<std::size_t>(source.sampler)];
+        loaded.wrapU = wrapOf(sampler.wrapS);
+        loaded.wrapV = wrapOf(sampler.wrapT);
+        loaded.nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+    }
+    return loaded;
+}
 
 TextureRef MaterialReader::texture(int index, int uvSet, const tinygltf::ExtensionMap& extensions,
                                    ColourSpace space, const std::string& what) {
@@ -71,35 +100,67 @@ TextureRef MaterialReader::texture(int index, int uvSet, const tinygltf::Extensi
         file_.fail(what + " refers to texture " + std::to_string(index) + ", the file has " +
                    std::to_string(model.textures.size()));
     TextureRef ref;
-    ref.uvSet = uvSet;
-    if (const tinygltf::Value* transform = extension(extensions, "KHR_texture_transform"))
+    if (const tinygltf::Value* transform = extension(extensions, "KHR_texture_transform")) {
         applyTransform(ref, *transform);
-    if (ref.uvSet != 0 && ref.uvSet != 1)
-        file_.fail(what + " uses TEXCOORD_" + std::to_string(ref.uvSet) + ": only 0 and 1 are supported");
+        uvSet = setIn(*transform, uvSet);
+    }
+    ref.uvSlot = slotOf(uvSet);
     const auto key = std::pair(index, space);
     const auto known = loaded_.find(key);
     if (known != loaded_.end()) {
         ref.texture = known->second;
         return ref;
     }
-    const tinygltf::Texture& source = model.textures[static_cast<std::size_t>(index)];
-    if (source.source < 0) {
-        std::string only;
-        for (const auto& [name, value] : source.extensions)
-            if (!isSupported(name)) only += ", only one of " + name + remedyFor(name);
-        file_.fail(what + " uses texture " + std::to_string(index) + ", which has no source" + only);
-    }
-    Texture loaded = file_.image(source.source, space);
-    if (source.sampler >= 0 && static_cast<std::size_t>(source.sampler) < model.samplers.size()) {
-        const tinygltf::Sampler& sampler = model.samplers[static_cast<std::size_t>(source.sampler)];
-        loaded.wrapU = wrapOf(sampler.wrapS);
-        loaded.wrapV = wrapOf(sampler.wrapT);
-        loaded.nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
-    }
+    Texture loaded = load(model.textures[static_cast<std::size_t>(index)], index, space, what);
     ref.texture = static_cast<int>(textures_.size());
     textures_.push_back(std::move(loaded));
     loaded_[key] = ref.texture;
     return ref;
+}
+
+int MaterialReader::slotOf(int uvSet) {
+    if (uvSet <= 0) return 0;
+    auto& sets = furtherUvSets_;
+    const auto found = std::ranges::find(sets, uvSet);
+    const auto slot = static_cast<int>(found - sets.begin()) + 1;
+    if (found == sets.end()) sets.push_back(uvSet);
+    return slot;
+}
+
+/// Of all a material says only the base colour matters.
+void MaterialReader::readUnlit(Material& m) const {
+    m.unlit = true;
+    m.emission = m.baseColour;
+    m.emissionTexture = m.baseColourTexture;
+    m.baseColour = {};
+    if (m.alphaMode == AlphaMode::Opaque) m.baseColourTexture = {};
+    m.metallic = m.specular = 0;
+    m.roughness = 1;
+}
+
+/// KHR_materials_pbrSpecularGlossiness: a dielectric whose reflection is of a colour, by way of
+/// KHR_materials_specular. What a texture of that colour takes off the diffuse part is left out.
+void MaterialReader::readGlossiness(Material& m, const tinygltf::Value& source, const std::string& what) {
+    constexpr float kReflected = 0.04f;  // at index 1.5
+    const std::vector<double> diffuse = numbers(source, "diffuseFactor");
+    const Rgb reflected = colour(numbers(source, "specularFactor"), {1, 1, 1});
+    const float glossiness = unit(number(source, "glossinessFactor", 1));
+    m.baseColour = colour(diffuse, {1, 1, 1});
+    m.opacity = diffuse.size() == 4 ? unit(diffuse[3]) : 1;
+    m.baseColourTexture = texture(source, "diffuseTexture", ColourSpace::Srgb, what);
+    m.metallic = 0;
+    m.specularColour = reflected / kReflected;
+    m.specularColourTexture = texture(source, "specularGlossinessTexture", ColourSpace::Srgb, what);
+    if (TextureRef& ref = m.metallicRoughnessTexture = m.specularColourTexture; ref) {
+        const auto index = static_cast<int>(number(source.Get("specularGlossinessTexture"), "index", -1));
+        ref.texture = static_cast<int>(textures_.size());
+        textures_.push_back(load(file_.model().textures[static_cast<std::size_t>(index)], index,
+                                 ColourSpace::Linear, what, glossiness));
+        m.roughness = 1;
+    } else {
+        m.roughness = 1 - glossiness;
+        m.baseColour *= 1 - std::min(1.f, maxComponent(reflected));
+    }
 }
 
 /// A textureInfo inside an extension.
@@ -110,8 +171,8 @@ TextureRef MaterialReader::texture(const tinygltf::Value& object, const std::str
     tinygltf::ExtensionMap extensions;
     if (info.Has("extensions") && info.Get("extensions").IsObject())
         extensions = info.Get("extensions").Get<tinygltf::Value::Object>();
-    return texture(static_cast<int>(number(info, "index", -1)), static_cast<int>(number(info, "texCoord", 0)),
-                   extensions, space, what + " " + key);
+    return texture(static_cast<int>(number(info, "index", -1)), setIn(info, 0), extensions, space,
+                   what + " " + key);
 }
 
 Material MaterialReader::read(const tinygltf::Material& source, std::size_t index) {
@@ -121,11 +182,22 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     const auto plain = [&](const auto& info, ColourSpace space, const char* name) {
         return texture(info.index, info.texCoord, info.extensions, space, what + " " + name);
     };
+    furtherUvSets_.clear();
     Material m;
     m.name = source.name;
     m.baseColour = colour(pbr.baseColorFactor, {1, 1, 1});
     if (pbr.baseColorFactor.size() == 4) m.opacity = unit(pbr.baseColorFactor[3]);
     m.baseColourTexture = plain(pbr.baseColorTexture, Srgb, "baseColorTexture");
+    m.doubleSided = source.doubleSided;
+    m.alphaMode = source.alphaMode == "MASK"    ? AlphaMode::Mask
+                  : source.alphaMode == "BLEND" ? AlphaMode::Blend
+                                                : AlphaMode::Opaque;
+    m.alphaCutoff = static_cast<float>(source.alphaCutoff);
+    if (source.extensions.contains("KHR_materials_unlit")) {
+        readUnlit(m);
+        m.furtherUvSets = furtherUvSets_;
+        return m;
+    }
     m.metallic = unit(pbr.metallicFactor);
     m.roughness = unit(pbr.roughnessFactor);
     m.metallicRoughnessTexture = plain(pbr.metallicRoughnessTexture, Linear, "metallicRoughnessTexture");
@@ -133,12 +205,10 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     m.emissionTexture = plain(source.emissiveTexture, Srgb, "emissiveTexture");
     m.normalTexture = plain(source.normalTexture, Linear, "normalTexture");
     m.normalScale = static_cast<float>(source.normalTexture.scale);
-    m.doubleSided = source.doubleSided;
-    m.alphaMode = source.alphaMode == "MASK"    ? AlphaMode::Mask
-                  : source.alphaMode == "BLEND" ? AlphaMode::Blend
-                                                : AlphaMode::Opaque;
-    m.alphaCutoff = static_cast<float>(source.alphaCutoff);
+    m.retro = retro_;
 
+    if (const auto* e = extension(source.extensions, "KHR_materials_pbrSpecularGlossiness"))
+        readGlossiness(m, *e, what);
     if (const auto* e = extension(source.extensions, "KHR_materials_emissive_strength"))
         m.emission *= static_cast<float>(std::clamp(number(*e, "emissiveStrength", 1), 0.0, 1e30));
     if (const auto* e = extension(source.extensions, "KHR_materials_ior")) {
@@ -153,6 +223,8 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
         m.specularTexture = texture(*e, "specularTexture", Linear, what);
         m.specularColour = colour(numbers(*e, "specularColorFactor"), {1, 1, 1});
         m.specularColourTexture = texture(*e, "specularColorTexture", Srgb, what);
+        // A Specular of 0 reflects nothing in that Blender, at grazing angles neither.
+        if (retro_ && isBlack(m.specularColour)) m.specular = 0;
     }
     if (const auto* e = extension(source.extensions, "KHR_materials_transmission")) {
         m.transmission = unit(number(*e, "transmissionFactor", 0));
@@ -172,6 +244,7 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
         m.sheenRoughnessTexture = texture(*e, "sheenRoughnessTexture", Linear, what);
     }
     if (const auto* e = extension(source.extensions, "KHR_materials_volume")) m.absorption = absorption(*e);
+    m.furtherUvSets = furtherUvSets_;
     return m;
 }
 

@@ -48,7 +48,6 @@ Transform NodeTree::atRest(std::size_t node) const {
     return localTransform(file_, source, described("node", node, source.name));
 }
 
-/// What animates a node or one above it, or nothing.
 std::string NodeTree::movesBy(std::size_t node) const {
     for (auto n = static_cast<std::int64_t>(node); n >= 0; n = parents_[static_cast<std::size_t>(n)]) {
         std::string cause = animations_.causeOf(static_cast<std::size_t>(n));
@@ -100,7 +99,7 @@ std::vector<PlacedNode> NodeTree::placed() {
     };
     std::vector<Pending> stack;
     std::vector<char> visited(model.nodes.size(), 0);
-    parents_.assign(model.nodes.size(), -1);
+    parents_.assign(model.nodes.size(), -2);
     std::vector<PlacedNode> placed;
     for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}, -1});
     while (!stack.empty()) {

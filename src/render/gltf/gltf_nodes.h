@@ -29,17 +29,24 @@ class NodeTree {
     /// nodes with two parents and transforms that are none.
     std::vector<PlacedNode> placed();
 
-  private:
-    Transform atRest(std::size_t node) const;
+    // Of the nodes that placed() has placed.
+    bool isPlaced(std::size_t node) const { return parents_[node] >= -1; }
+    /// What animates a node or one above it, or nothing.
     std::string movesBy(std::size_t node) const;
     Transform placeAt(std::size_t node, double seconds) const;
+
+    const Animations& animations() const { return animations_; }
+    const Shutter& shutter() const { return shutter_; }
+
+  private:
+    Transform atRest(std::size_t node) const;
     Motion motionOf(std::size_t node, double later) const;
     std::optional<Course> courseOf(std::size_t node, const Motion& own) const;
 
     const GltfFile& file_;
     Shutter shutter_;
     Animations animations_;
-    std::vector<std::int64_t> parents_;  ///< of each node; -1: a root
+    std::vector<std::int64_t> parents_;  ///< of each node; -1: a root; -2: not in the scene
 };
 
 }  // namespace vlx::render

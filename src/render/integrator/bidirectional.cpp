@@ -71,7 +71,8 @@ class BidirectionalTracer::EyeEstimate {
     }
 
     void gather(const GeneralWalk& walk, const EyeVertex& eye, const BouncePairs& pairs, std::uint32_t seed) {
-        sums_.arrive(walk.way * walk.way, eye.cosine(eye.back));
+        const bool parallel = walk.bounces == 0 && tracer_.view().parallel();  // the camera ray's density
+        sums_.arrive(parallel ? 1 : walk.way * walk.way, eye.cosine(eye.back));
         lightsSampled_ = eye.side.bsdf.hasSmoothLobe() && !in_.lights.empty();
         if (!lightsSampled_) return;
         in_.lights.prepare(local_, receiverAt(eye.point));
@@ -177,7 +178,8 @@ void BidirectionalTracer::splat(const LightVertex& light, Vec2 lens, float time,
     const BsdfValue f = side.evaluate(light.at.back);
     if (isBlack(f.value)) return;
     if (context_.accelerator.occluded({seen.origin, -direction, time}, distance * kReach, seed)) return;
-    const double area = seen.density * light.at.cosine(direction) / static_cast<double>(d2);
+    const double area =
+        seen.density * light.at.cosine(direction) / (view().parallel() ? 1 : static_cast<double>(d2));
     const double perPixel = mis(area / static_cast<double>(window_.pixels()));
     const MisSums& sums = light.sums;
     const float w = weight(Strategies::Splatting, perPixel * (sums.vcm + sums.vc * mis(f.pdf)));

@@ -49,6 +49,7 @@ PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler
     PathSample result;
     Walk<F> walk{in, start};
     bool featuresPending = true;
+    bool mirrored = true;  // nothing but mirrors and clear glass so far
     const std::uint32_t seed = in.hashesOpacity ? sampler.hashSeed(dimension::kOpacity) : 0;
 
     for (;;) {
@@ -75,9 +76,14 @@ PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler
         }
 
         const SurfacePoint point = walk.arrive(*hit);
-        const bool emits =
-            point.material->emissive() && (!point.fromBehind || point.material->visibleFromBehind());
-        if (emits) estimator.meet(walk, surfaceMet(in, *hit, point, ray.direction));
+        const bool emits = point.material->emissive() && (mirrored || !point.material->unlit) &&
+                           (!point.fromBehind || point.material->visibleFromBehind());
+        Rgb shown(1);  // what shines is white among the features
+        if (emits) {
+            const MetLight met = surfaceMet(in, *hit, point, ray.direction);
+            estimator.meet(walk, met);
+            if (point.material->unlit) shown = met.radiance;
+        }
         if (!featuresPending && walk.bounces >= in.options.maxBounces) break;
 
         const PathVertex<F> vertex(walk, point);
@@ -85,7 +91,7 @@ PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler
         if (featuresPending && (bsdf.hasSmoothLobe() || emits)) {
             featuresPending = false;
             result.normal = point.shadingNormal;
-            if (!emits) result.albedo = bsdf.albedo();
+            result.albedo = emits ? shown : bsdf.albedo();
         }
         if (walk.bounces >= in.options.maxBounces) break;
         if (walk.bounces > 0) countEffect(Effect::Indirect);
@@ -99,6 +105,7 @@ PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler
         if (isBlack(next.weight)) break;
         const Vec3 direction = normalized(vertex.side.frame.toWorld(next.wi));
         estimator.scatter(vertex, next, direction);
+        mirrored = mirrored && next.delta;
         walk.throughput *= next.weight;
         const float survival = std::min(1.f, maxComponent(walk.throughput));
         if (!walk.goOn(vertex, next, direction, survival, choice.y)) break;

@@ -11,6 +11,14 @@ namespace vlx::render {
 
 enum class LightType : std::uint8_t { Point, Spot, Directional, Sphere, Mesh, Environment };
 
+/// In what the intensities of a file's punctual lights are: W/sr and W/m2, or cd and lx; Auto: judged by the
+/// file.
+enum class LightUnits : std::uint8_t { Auto, Radiometric, Photometric };
+
+/// A spot fades from the edge of its cone, t = 0, to where it is full, t = 1, by t^2 times this: 1, as
+/// KHR_lights_punctual recommends, or, with `step` 1, what makes it the smooth step 3 t^2 - 2 t^3.
+inline float coneEase(float t, float step) { return 1 + 2 * step * (1 - t); }
+
 /// A light as next-event estimation sees it. Radiometric units.
 struct Light {
     LightType type = LightType::Point;
@@ -20,9 +28,11 @@ struct Light {
     Vec3 position;     ///< also the centre of a mesh light's bounds
     Vec3 direction;    ///< unit, in which light travels (Spot, Directional, a spot's sphere)
     float radius = 0;  ///< of a sphere; of a mesh light's bounds
-    /// KHR_lights_punctual's cone: factor clamp(cos x scale + offset, 0, 1)^2; 0 and 1 for all around.
+    /// A spot's cone: t = clamp(cos x scale + offset, 0, 1); 0 and 1 for all around.
     float coneScale = 0;
     float coneOffset = 1;
+    float coneStep = 0;        ///< of coneEase
+    float coneCosine = 0;      ///< 1: times the cosine with the axis
     float range = 0;           ///< of Point and Spot; 0: without end
     std::int32_t course = -1;  ///< of a sphere: index into the scene's courses, or -1
 
@@ -33,7 +43,9 @@ struct Light {
 
     /// Factor of the cone towards a unit vector that leaves the light.
     float cone(const Vec3& away) const {
-        return square(std::clamp(dot(away, direction) * coneScale + coneOffset, 0.f, 1.f));
+        const float cosine = dot(away, direction);
+        const float t = std::clamp(cosine * coneScale + coneOffset, 0.f, 1.f);
+        return square(t) * coneEase(t, coneStep) * (1 - coneCosine + coneCosine * cosine);
     }
     /// KHR_lights_punctual's window (Point, Spot): 1 - (distance / range)^4, 0 beyond the range.
     float window(float distanceSquared) const {

@@ -55,7 +55,7 @@ LightEmitter::LightEmitter(const Scene& scene)
         powers.push_back(power);
         power_ += power;
     }
-    lights_ = Distribution(powers);
+    if (!powers.empty()) lights_ = Distribution(powers);  // all that is seen may be unlit
 }
 
 float LightEmitter::leastCosine(const Light& light) const {

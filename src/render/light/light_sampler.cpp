@@ -6,7 +6,7 @@ LightSampler::LightSampler(const Scene& scene, bool measures)
     for (const Light& light : scene.lights) {
         const float strength = maxComponent(light.intensity);
         candidates_.push_back({light.position, light.radius, light.direction, strength, light.area,
-                               light.coneScale, light.coneOffset, light.type});
+                               light.coneScale, light.coneOffset, light.coneStep, light.type});
         meshes_.emplace_back();
         if (light.type == LightType::Mesh) addTriangles(light);
         if (light.type == LightType::Environment)

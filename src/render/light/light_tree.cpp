@@ -29,6 +29,7 @@ void LightQuad::set(std::size_t lane, const LightCandidate& light) {
     strength[lane] = light.strength;
     coneScale[lane] = light.coneScale;
     coneOffset[lane] = light.coneOffset;
+    coneStep[lane] = light.coneStep;
     area[lane] = far ? kHuge * kHuge : mesh ? light.area : 1;
     nearest[lane] = mesh ? 0.25f * square(light.radius) : square(light.radius);
     most[lane] = mesh || far ? kPi : kHuge * kHuge;
@@ -55,7 +56,9 @@ LightQuad::Floats LightQuad::importance(const Receiver& receiver) const {
     const Floats cone = greater(lesser(coneOffset - along * coneScale, one), none);
     const Floats facing = -(dx * receiver.normal.x + dy * receiver.normal.y + dz * receiver.normal.z);
     const Floats cosine = receiver.bothSides ? one : greater(isDirectional ? facing : height * inverse, none);
-    const Floats narrow = isDirectional ? cosine : cone * cone * cosine * inverse * inverse;
+    const Floats narrow =
+        isDirectional ? cosine
+                      : cone * cone * (one + 2 * coneStep * (one - cone)) * cosine * inverse * inverse;
     return strength * ((isPoint | isDirectional) ? narrow : above * spread);
 }
 

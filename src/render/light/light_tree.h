@@ -25,6 +25,7 @@ struct LightCandidate {
     float area = 0;
     float coneScale = 0;
     float coneOffset = 1;
+    float coneStep = 0;
     LightType type = LightType::Point;
 
     bool finite() const { return type != LightType::Directional && type != LightType::Environment; }
@@ -54,7 +55,7 @@ inline float lightImportance(const Receiver& receiver, const LightCandidate& lig
             const Vec3 direction = to / std::sqrt(d2);
             const float cone =
                 std::clamp(light.coneOffset - dot(direction, light.direction) * light.coneScale, 0.f, 1.f);
-            return strength * cone * cone * cosineAt(direction) / d2;
+            return strength * cone * cone * coneEase(cone, light.coneStep) * cosineAt(direction) / d2;
         }
         case LightType::Directional:
             return strength * cosineAt(-light.direction);
@@ -80,7 +81,7 @@ struct LightQuad {
     Floats x{}, y{}, z{};     ///< position
     Floats dx{}, dy{}, dz{};  ///< direction
     Floats strength{};        ///< 0: no light
-    Floats coneScale{}, coneOffset{};
+    Floats coneScale{}, coneOffset{}, coneStep{};
     Floats area{}, nearest{}, most{};  ///< of min(area / max(distance^2, nearest), most)
     Floats depth{};                    ///< of the bounds below the horizon
     Mask isPoint{}, isDirectional{};

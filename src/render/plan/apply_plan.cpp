@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "render/plan/plan.h"
+#include "render/surface/surface.h"
 
 namespace vlx::render {
 namespace {
@@ -30,7 +31,7 @@ void leaveOutOfMaterial(Material& m, const EffectSet& out) {
     if (out.has(Effect::Sheen)) m.sheenColour = {};
     if (out.has(Effect::NormalMaps)) m.normalTexture = {};
     if (out.has(Effect::Alpha)) m.alphaMode = AlphaMode::Opaque;
-    if (out.has(Effect::EmissiveMeshes)) m.emission = {};
+    if (out.has(m.unlit ? Effect::Unlit : Effect::EmissiveMeshes)) m.emission = {};
     if (out.has(Effect::Textures)) {
         m.baseColourTexture = m.metallicRoughnessTexture = m.emissionTexture = m.transmissionTexture =
             m.specularTexture = m.specularColourTexture = m.clearcoatTexture = m.clearcoatRoughnessTexture =
@@ -42,6 +43,22 @@ void leaveOutOfMaterial(Material& m, const EffectSet& out) {
 /// What is left out of this picture's exposure is left out of its neighbours'.
 void freeze(Course& course) {
     for (Motion* motion : {&course.before, &course.after}) motion->places = {motion->at(0.5f)};
+}
+
+/// Leaves of each exposure one block, of its middle.
+void freeze(Scene& scene, const Shape& shape, const Deformation& d) {
+    const std::array<std::uint32_t, 3> steps{d.steps, d.neighbourSteps, d.neighbourSteps};
+    std::uint32_t first = 0;
+    for (std::uint32_t frame = 0; frame < 3 && steps[frame] > 0; first += steps[frame++]) {
+        // Written where nothing is read any more: before or in the blocks that it is made of.
+        const Between middle = blocksAt(shape, first, steps[frame], 0.5f);
+        for (std::uint32_t i = shape.firstVertex; i < shape.firstVertex + shape.vertices; ++i)
+            scene.vertices[i + frame * shape.vertices] = cornerAt(scene, i, middle);
+        if (frame > 0 || shape.firstTangent < 0) continue;
+        const std::uint32_t nearest = middle.part < 0.5f ? middle.before : middle.after;
+        const auto tangents = scene.tangents.begin() + shape.firstTangent;
+        std::copy_n(tangents + nearest, shape.vertices, tangents);
+    }
 }
 
 }  // namespace
@@ -84,6 +101,13 @@ void applyPlan(Scene& scene, const Plan& plan) {
     for (Instance& instance : scene.instances) instance.motion = -1;
     scene.motions.clear();
     for (Course& course : scene.courses) freeze(course);
+    for (const Shape& shape : scene.shapes)
+        if (shape.deformation >= 0)
+            freeze(scene, shape, scene.deformations[static_cast<std::size_t>(shape.deformation)]);
+    for (Deformation& d : scene.deformations) {
+        d.steps = 1;
+        d.neighbourSteps = std::min(d.neighbourSteps, 1u);
+    }
 }
 
 }  // namespace vlx::render

@@ -23,6 +23,7 @@ enum class Effect : std::uint8_t {
     NormalMaps,
     Alpha,
     EmissiveMeshes,
+    Unlit,
     PunctualLights,
     SphereLights,
     Environment,
@@ -33,11 +34,12 @@ enum class Effect : std::uint8_t {
     Caustics
 };
 
-inline constexpr std::array<std::string_view, 20> kEffectNames = {
-    "diffuse",        "glossy",          "mirror",          "transmission",  "rough_transmission",
-    "absorption",     "clearcoat",       "sheen",           "textures",      "normal_maps",
-    "alpha",          "emissive_meshes", "punctual_lights", "sphere_lights", "environment",
-    "depth_of_field", "camera_motion",   "object_motion",   "indirect",      "caustics"};
+inline constexpr std::array<std::string_view, 21> kEffectNames = {
+    "diffuse",     "glossy",          "mirror",        "transmission",    "rough_transmission",
+    "absorption",  "clearcoat",       "sheen",         "textures",        "normal_maps",
+    "alpha",       "emissive_meshes", "unlit",         "punctual_lights", "sphere_lights",
+    "environment", "depth_of_field",  "camera_motion", "object_motion",   "indirect",
+    "caustics"};
 inline constexpr std::size_t kEffects = kEffectNames.size();
 
 constexpr std::string_view nameOf(Effect effect) { return kEffectNames[static_cast<std::size_t>(effect)]; }

@@ -9,6 +9,9 @@
 namespace vlx::render {
 namespace {
 
+constexpr std::array kLightEffects{Effect::EmissiveMeshes, Effect::PunctualLights, Effect::SphereLights,
+                                   Effect::Environment};
+
 std::string quoted(const std::string& kind, const std::string& name, std::size_t index) {
     return kind + " " + (name.empty() ? std::to_string(index) : "'" + name + "'");
 }
@@ -66,6 +69,10 @@ class Analysis {
                     "lets rays through by its opacity");
             case Effect::EmissiveMeshes:
                 return emissiveMeshes();
+            case Effect::Unlit:
+                return material(
+                    met_, [&](std::size_t m) { return scene_.materials[m].unlit; },
+                    "shows its colour, whatever the light");
             case Effect::PunctualLights:
                 return light("punctual light", [](LightType t) {
                     return t == LightType::Point || t == LightType::Spot || t == LightType::Directional;
@@ -121,6 +128,9 @@ class Analysis {
         for (std::size_t i = 0; i < scene_.worldShapes; ++i)
             if (const std::int32_t c = scene_.shapes[i].course; c >= 0 && reach_.seen(i))
                 return moves("something in sight moves", courses[static_cast<std::size_t>(c)]);
+        for (std::size_t i = 0; i < scene_.worldShapes; ++i)
+            if (const Deformation* d = deformationOf(i); d && d->neighbourSteps > 0 && reach_.seen(i))
+                return {true, "something in sight deforms from frame to frame: " + d->cause};
         for (const Instance& instance : scene_.instances) {
             if (instance.course < 0) continue;
             const Group& group = scene_.groups[instance.group];
@@ -132,8 +142,15 @@ class Analysis {
         for (std::size_t i = 0; i < scene_.lights.size(); ++i)
             if (const std::int32_t c = scene_.lights[i].course; c >= 0)
                 return moves(lightName(i) + " moves", courses[static_cast<std::size_t>(c)]);
-        return {false, courses.empty() ? "nothing moves from frame to frame"
-                                       : "nothing in sight moves from frame to frame"};
+        const bool still = courses.empty() && std::ranges::none_of(scene_.deformations, [](const auto& d) {
+                               return d.neighbourSteps > 0;
+                           });
+        return {false,
+                still ? "nothing moves from frame to frame" : "nothing in sight moves from frame to frame"};
+    }
+
+    std::string whyIdle(std::size_t light) const {
+        return lightName(light) + " does nothing: " + idle_[light];
     }
 
     std::vector<std::size_t> idleLights() const {
@@ -144,6 +161,10 @@ class Analysis {
     }
 
   private:
+    const Deformation* deformationOf(std::size_t shape) const {
+        const std::int32_t d = scene_.shapes[shape].deformation;
+        return d < 0 ? nullptr : &scene_.deformations[static_cast<std::size_t>(d)];
+    }
     static std::string number(double v) {
         std::string text = std::to_string(v);
         text.erase(text.find_last_not_of('0') + 1);
@@ -197,7 +218,7 @@ class Analysis {
             add(m.clearcoatRoughnessTexture, "clear coat's roughness");
             add(m.sheenColourTexture, "sheen colour");
             add(m.sheenRoughnessTexture, "sheen's roughness");
-            if (m.emissive()) add(m.emissionTexture, "emission");
+            if (m.emissive()) add(m.emissionTexture, m.unlit ? "colour" : "emission");
             return list;
         };
         Finding f = material(
@@ -214,7 +235,7 @@ class Analysis {
         for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
             if (!is(scene_.lights[i].type)) continue;
             if (idle_[i].empty()) return {true, lightName(i) + " shines"};
-            if (outside.empty()) outside = lightName(i) + " does nothing: " + idle_[i];
+            if (outside.empty()) outside = whyIdle(i);
         }
         return {false, outside.empty() ? "there is no " + kind : outside};
     }
@@ -233,7 +254,7 @@ class Analysis {
     }
     bool movingEmitter(std::size_t shape) const {
         const Shape& s = scene_.shapes[shape];
-        return s.light < 0 && scene_.materials[s.material].emissive() && reach_.met(shape);
+        return s.light < 0 && scene_.materials[s.material].shines() && reach_.met(shape);
     }
 
     Finding environment() const {
@@ -251,7 +272,11 @@ class Analysis {
                 if (reach_.met(i))
                     return {true, scene_.motions[static_cast<std::size_t>(instance.motion)].cause};
         }
-        if (!scene_.motions.empty()) return {false, "no path can meet what moves"};
+        for (std::size_t i = 0; i < scene_.worldShapes; ++i)
+            if (const Deformation* d = deformationOf(i); d && d->moves() && reach_.met(i))
+                return {true, d->cause};
+        if (!scene_.motions.empty() || std::ranges::any_of(scene_.deformations, &Deformation::moves))
+            return {false, "no path can meet what moves"};
         return {false, scene_.animations == 0 ? "nothing moves: there is no animation"
                                               : "no animation moves anything" + exposure()};
     }
@@ -326,6 +351,10 @@ std::optional<EffectRequest> parseEffects(std::string_view text, std::string& br
     return request;
 }
 
+bool Plan::lit() const {
+    return std::ranges::any_of(kLightEffects, [&](Effect e) { return of(e).called && of(e).planned; });
+}
+
 std::vector<std::string> Plan::simulated() const {
     std::vector<std::string> names;
     for (const PlannedEffect& e : effects)
@@ -350,6 +379,12 @@ Plan planEffects(const Scene& scene, const PlanOptions& options) {
         e.reason = "left out by --effects, although " + finding.reason;
         plan.warnings.push_back("the image is biased: " + std::string(nameOf(effect)) +
                                 " left out, although " + finding.reason);
+    }
+    if (std::ranges::none_of(kLightEffects, [&](Effect e) { return plan.called.has(e); })) {
+        const auto idle = analysis.idleLights();
+        plan.warnings.push_back("no light reaches anything, and the picture is black" +
+                                (idle.empty() ? "" : " (" + analysis.whyIdle(idle.front()) + ")") +
+                                ": --env-constant 1,1,1 or --env IMAGE lights it from all around");
     }
     plan.motion = analysis.motion();
     if (plan.general) return plan;

@@ -66,6 +66,8 @@ struct Plan {
     std::vector<std::string> warnings;
 
     const PlannedEffect& of(Effect e) const { return effects[static_cast<std::size_t>(e)]; }
+    /// Whether any light is called for and planned.
+    bool lit() const;
     /// Names of what the picture holds, for the dump's header: what is called for and planned.
     std::vector<std::string> simulated() const;
 };

@@ -55,8 +55,7 @@ Reach::Reach(const Scene& scene, const MaterialRanges& ranges, const PlanOptions
       seen_(scene.shapes.size(), 0) {
     std::vector<Bounds> own(scene.shapes.size());
     for (std::size_t i = 0; i < scene.shapes.size(); ++i)
-        for (std::uint32_t v = 0; v < scene.shapes[i].vertices; ++v)
-            own[i].include(scene.vertices[scene.shapes[i].firstVertex + v].position);
+        for (const Vertex& v : verticesOf(scene, scene.shapes[i])) own[i].include(v.position);
     for (std::size_t i = 0; i < scene.worldShapes; ++i) {
         bounds_[i] = own[i];
         seen_[i] = inView(own[i]);
@@ -90,18 +89,21 @@ bool Reach::inView(const Bounds& bounds) const {
     if (camera.motion.moves() || camera.lensRadius > 0) return true;
     const auto toCamera = camera.toWorld.inverse();
     if (!toCamera) return true;
-    const float tanY = std::tan(0.5f * camera.verticalFov) * 1.001f;
-    const float tanX = tanY * static_cast<float>(options_.width) / static_cast<float>(options_.height);
+    const bool parallel = camera.orthographicHeight > 0;
+    const float halfY =
+        (parallel ? 0.5f * camera.orthographicHeight : std::tan(0.5f * camera.verticalFov)) * 1.001f;
+    const float halfX = halfY * static_cast<float>(options_.width) / static_cast<float>(options_.height);
     std::array<bool, 5> outside{true, true, true, true, true};
     for (const Vec3& corner : corners(bounds)) {
         const Vec3 p = toCamera->point(corner);
         const float depth = -p.z;
         const float slack = 1e-4f * (1 + length(p));
+        const float scale = parallel ? 1 : depth;
         outside[0] = outside[0] && depth < -slack;
-        outside[1] = outside[1] && p.x > depth * tanX + slack;
-        outside[2] = outside[2] && -p.x > depth * tanX + slack;
-        outside[3] = outside[3] && p.y > depth * tanY + slack;
-        outside[4] = outside[4] && -p.y > depth * tanY + slack;
+        outside[1] = outside[1] && p.x > scale * halfX + slack;
+        outside[2] = outside[2] && -p.x > scale * halfX + slack;
+        outside[3] = outside[3] && p.y > scale * halfY + slack;
+        outside[4] = outside[4] && -p.y > scale * halfY + slack;
     }
     return std::ranges::none_of(outside, [](bool o) { return o; });
 }
@@ -141,12 +143,15 @@ std::string Reach::idleMesh(const Light& light) const {
     const Vec3 eye = camera.toWorld.point({0, 0, 0});
     const float slack = camera.lensRadius + 1e-4f * (1 + length(scene_.boundsMax - scene_.boundsMin));
     if (camera.motion.moves()) return "";
+    const bool parallel = camera.orthographicHeight > 0;
+    if (parallel && camera.lensRadius > 0) return "";
+    const Vec3 back = camera.toWorld.vector({0, 0, 1});
     for (std::uint32_t t = 0; t < shape.triangles; ++t) {
         const auto& corner = scene_.triangles[shape.firstTriangle + t];
         const Vec3& a = scene_.vertices[corner[0]].position;
         const Vec3 n = normalized(
             cross(scene_.vertices[corner[1]].position - a, scene_.vertices[corner[2]].position - a));
-        if (dot(n, eye - a) > -slack) return "";
+        if (parallel ? dot(n, back) > -1e-4f : dot(n, eye - a) > -slack) return "";
         if (others.empty()) continue;
         for (const Vec3& p : corners(others))
             if (dot(n, p - a) > slack) return "";
@@ -167,8 +172,8 @@ bool Reach::coplanar() const {
             origin = position(t[0]);
             normal = normalized(cross(position(t[1]) - *origin, position(t[2]) - *origin));
         }
-        for (std::uint32_t v = 0; v < shape.vertices; ++v)
-            if (std::abs(dot(*normal, position(shape.firstVertex + v) - *origin)) > slack) return false;
+        for (const Vertex& v : verticesOf(scene_, shape))
+            if (std::abs(dot(*normal, v.position - *origin)) > slack) return false;
     }
     return true;
 }

@@ -110,8 +110,13 @@ struct Accelerator::Impl {
     void attachShape(RTCScene to, std::uint32_t index, std::uint32_t id) {
         const Shape& shape = scene.shapes[index];
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                   scene.vertices.data(), 0, sizeof(Vertex), scene.vertices.size());
+        const std::uint32_t steps =
+            shape.deformation < 0 ? 1 : scene.deformations[static_cast<std::size_t>(shape.deformation)].steps;
+        rtcSetGeometryTimeStepCount(geometry, steps);
+        for (std::uint32_t step = 0; step < steps; ++step)
+            rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
+                                       scene.vertices.data() + std::size_t{step} * shape.vertices, 0,
+                                       sizeof(Vertex), std::size_t{shape.firstVertex} + shape.vertices);
         rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                    scene.triangles.data() + shape.firstTriangle, 0,
                                    sizeof(scene.triangles[0]), shape.triangles);

@@ -14,10 +14,8 @@ void setBounds(Scene& scene) {
         high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
     };
     const auto includeShape = [&](const Shape& shape, const Transform* toWorld) {
-        for (std::uint32_t i = 0; i < shape.vertices; ++i) {
-            const Vec3& p = scene.vertices[shape.firstVertex + i].position;
-            include(toWorld != nullptr ? toWorld->point(p) : p);
-        }
+        for (const Vertex& v : verticesOf(scene, shape))
+            include(toWorld != nullptr ? toWorld->point(v.position) : v.position);
     };
     for (std::uint32_t i = 0; i < scene.worldShapes; ++i) includeShape(scene.shapes[i], nullptr);
     for (const Instance& instance : scene.instances) {
@@ -125,7 +123,10 @@ void completeScene(Scene& scene) {
     setBounds(scene);
     prepareMaterials(scene);
     for (std::uint32_t i = 0; i < scene.worldShapes; ++i) {
-        if (!scene.materials[scene.shapes[i].material].emissive()) continue;
+        const std::int32_t deformation = scene.shapes[i].deformation;
+        if (!scene.materials[scene.shapes[i].material].shines() ||
+            (deformation >= 0 && scene.deformations[static_cast<std::size_t>(deformation)].moves()))
+            continue;
         scene.shapes[i].light = static_cast<std::int32_t>(scene.lights.size());
         scene.lights.push_back(meshLight(scene, i));
     }

@@ -1,5 +1,6 @@
 #include "render/scene/frame_motion.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "render/scene/scene.h"
@@ -31,6 +32,17 @@ TracedPoint tracedPoint(const Scene& scene, const Ray& ray, const Hit& hit, floa
     } else {
         const Shape& shape = scene.shapes[hit.shape];
         const auto& corner = scene.triangles[shape.firstTriangle + hit.triangle];
+        if (shape.deformation >= 0) {
+            const Deformation& d = scene.deformations[static_cast<std::size_t>(shape.deformation)];
+            const auto in = [&](std::uint32_t first, std::uint32_t steps) {
+                const Between moment = blocksAt(shape, first, steps, time);
+                const auto at = [&](std::size_t i) { return cornerAt(scene, corner[i], moment).position; };
+                return interpolated(at(0), at(1), at(2), hit.u, hit.v);
+            };
+            own = in(0, d.steps);
+            const std::uint32_t n = d.neighbourSteps;
+            return n == 0 ? TracedPoint{own, own, own} : TracedPoint{own, in(d.steps, n), in(d.steps + n, n)};
+        }
         held = own = interpolated(scene.vertices[corner[0]].position, scene.vertices[corner[1]].position,
                                   scene.vertices[corner[2]].position, hit.u, hit.v);
         course = shape.course;
@@ -60,7 +72,8 @@ FrameMotion::FrameMotion(const Scene& scene, const Camera& camera, int width, in
       own_(camera, width, height),
       before_(inNeighbour(camera, &Course::before), width, height),
       after_(inNeighbour(camera, &Course::after), width, height),
-      frozen_(!camera.motion.moves() && scene.motions.empty()) {}
+      frozen_(!camera.motion.moves() && scene.motions.empty() &&
+              std::ranges::none_of(scene.deformations, &Deformation::moves)) {}
 
 Moved FrameMotion::of(const Ray& ray, const std::optional<Hit>& hit) const {
     const float time = frozen_ ? 0.5f : ray.time;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -39,9 +40,20 @@ std::vector<T> toRgba(const std::vector<T>& in, int channels, T one) {
     return out;
 }
 
+/// Of four channels whose fourth is a glossiness: the second becomes the roughness.
+template <class T>
+std::vector<T> withRoughness(std::vector<T> rgba, std::optional<float> glossiness, float one) {
+    for (std::size_t i = 0; glossiness && i + 3 < rgba.size(); i += 4) {
+        const float glossy = std::clamp(static_cast<float>(rgba[i + 3]), 0.f, one);
+        const float rough = one - *glossiness * glossy;
+        rgba[i + 1] = std::is_integral_v<T> ? static_cast<T>(std::lround(rough)) : static_cast<T>(rough);
+    }
+    return rgba;
+}
+
 }  // namespace
 
-Texture GltfFile::image(int index, ColourSpace space) const {
+Texture GltfFile::image(int index, ColourSpace space, std::optional<float> glossiness) const {
     if (index < 0 || static_cast<std::size_t>(index) >= model_.images.size())
         fail("a texture refers to image " + std::to_string(index) + ", the file has " +
              std::to_string(model_.images.size()));
@@ -68,11 +80,12 @@ Texture GltfFile::image(int index, ColourSpace space) const {
     if (info.bytes) {
         std::vector<std::uint8_t> pixels(values);
         if (!in->readAll(pixels.data())) fail(what + " cannot be decoded: " + in->error());
-        return {width, height, toRgba<std::uint8_t>(pixels, channels, 255), space};
+        return {width, height, withRoughness(toRgba<std::uint8_t>(pixels, channels, 255), glossiness, 255),
+                space};
     }
     std::vector<float> pixels(values);
     if (!in->readAll(0, pixels.data())) fail(what + " cannot be decoded: " + in->error());
-    return {width, height, toRgba(pixels, channels, 1.f), space};
+    return {width, height, withRoughness(toRgba(pixels, channels, 1.f), glossiness, 1), space};
 }
 
 Environment loadEnvironment(const std::string& path) {

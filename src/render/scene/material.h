@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "render/math/vec.h"
 #include "render/scene/texture.h"
@@ -11,8 +12,8 @@ namespace vlx::render {
 enum class AlphaMode : std::uint8_t { Opaque, Mask, Blend };
 
 /// A glTF material: metallic-roughness with the extensions transmission, ior, specular, clearcoat,
-/// emissive_strength, sheen, and volume's absorption. Textures multiply the factors, as the specifications
-/// say.
+/// emissive_strength, sheen, unlit, and volume's absorption. Textures multiply the factors, as the
+/// specifications say.
 struct Material {
     std::string name;
 
@@ -24,6 +25,7 @@ struct Material {
     TextureRef metallicRoughnessTexture;  ///< g: roughness, b: metallic
     Rgb emission{0, 0, 0};                ///< radiance: emissiveFactor x emissiveStrength
     TextureRef emissionTexture;
+    bool retro = false;  ///< diffuse light as in Disney's model (bsdf_model.h)
     float normalScale = 1;
     TextureRef normalTexture;
 
@@ -50,6 +52,12 @@ struct Material {
     float alphaCutoff = 0.5f;
     bool doubleSided = false;
 
+    /// KHR_materials_unlit: its colour, kept in `emission` (all else is black), is seen by the camera and in
+    /// what is smooth, and lights nothing.
+    bool unlit = false;
+
+    std::vector<int> furtherUvSets;  ///< the numbers of those that its textures use, besides 0
+
     int albedoTable = 0;  ///< index into the scene's tables
     /// Index into the scene's glass tables, -1 when not rough transmissive.
     int glassTable = -1;
@@ -58,6 +66,7 @@ struct Material {
     bool textured = false;
 
     bool emissive() const { return !isBlack(emission); }
+    bool shines() const { return emissive() && !unlit; }  ///< on others, too
     bool absorbs() const { return transmissive() && !isBlack(absorption); }
     bool transmissive() const { return transmission > 0 && metallic < 1; }
     /// Seen from behind: double-sided, or a boundary of a solid that light crosses.

@@ -1,5 +1,7 @@
 #include "render/scene/scene.h"
 
+#include <algorithm>
+
 #include "render/plan/effect_counters.h"
 #include "render/surface/surface.h"
 
@@ -27,6 +29,20 @@ std::uint64_t Scene::triangleCount() const {
     return count;
 }
 
+std::span<const Vertex> verticesOf(const Scene& scene, const Shape& shape) {
+    const std::uint32_t steps =
+        shape.deformation < 0 ? 1 : scene.deformations[static_cast<std::size_t>(shape.deformation)].steps;
+    return std::span(scene.vertices).subspan(shape.firstVertex, std::size_t{steps} * shape.vertices);
+}
+
+Between blocksAt(const Shape& shape, std::uint32_t first, std::uint32_t steps, float time) {
+    const float position = std::clamp(time, 0.f, 1.f) * static_cast<float>(steps - 1);
+    const std::uint32_t before = std::min(static_cast<std::uint32_t>(position), steps - 1);
+    const std::uint32_t after = std::min(before + 1, steps - 1);
+    return {(first + before) * shape.vertices, (first + after) * shape.vertices,
+            position - static_cast<float>(before)};
+}
+
 Rgba vertexColourAt(const Scene& scene, const Shape& shape, const std::array<std::uint32_t, 3>& corner,
                     float u, float v) {
     const auto c = corners(scene.colours, shape.firstColour, shape, corner);
@@ -40,10 +56,11 @@ TextureCoordinates textureCoordinates(const Scene& scene, const Shape& shape, st
     TextureCoordinates uv;
     uv.first = interpolated(scene.vertices[corner[0]].uv, scene.vertices[corner[1]].uv,
                             scene.vertices[corner[2]].uv, u, v);
-    uv.second = uv.first;
-    if (shape.firstSecondUv >= 0) {
-        const auto s = corners(scene.secondUvs, shape.firstSecondUv, shape, corner);
-        uv.second = interpolated(*s[0], *s[1], *s[2], u, v);
+    if (shape.firstFurtherUv >= 0) {
+        uv.further = corners(scene.furtherUvs, shape.firstFurtherUv, shape, corner);
+        uv.stride = shape.vertices;
+        uv.u = u;
+        uv.v = v;
     }
     return uv;
 }
@@ -67,7 +84,7 @@ float opacityAt(const Scene& scene, const Shape& shape, std::uint32_t triangle, 
 Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triangle, float u, float v,
                     float cosTheta) {
     const Material& material = scene.materials[shape.material];
-    countEffect(Effect::EmissiveMeshes);
+    if (!material.unlit) countEffect(Effect::EmissiveMeshes);
     Rgb emission = material.emission;
     if (material.emissionTexture) {
         countEffect(Effect::Textures);
@@ -76,25 +93,31 @@ Rgb emittedRadiance(const Scene& scene, const Shape& shape, std::uint32_t triang
                         .lookup(uv.of(material.emissionTexture))
                         .rgb;
     }
+    if (material.unlit) {
+        countEffect(Effect::Unlit);
+        if (shape.firstColour >= 0)
+            emission *= vertexColourAt(scene, shape, scene.triangles[triangle], u, v).rgb;
+    }
     if (material.clearcoat > 0) emission *= 1 - material.clearcoat * dielectricFresnel(cosTheta, 1.5f);
     return emission;
 }
 
 Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& material,
                   const std::array<std::uint32_t, 3>& corner, float u, float v, const TextureCoordinates& uv,
-                  const Vec3& normal) {
+                  const Vec3& normal, std::uint32_t block) {
     countEffect(Effect::NormalMaps);
     Vec3 tangent;
     float sign = 1;
     if (shape.firstTangent >= 0) {
-        const auto t = corners(scene.tangents, shape.firstTangent, shape, corner);
+        const auto t = corners(scene.tangents, shape.firstTangent + block, shape, corner);
         tangent = interpolated(t[0]->direction, t[1]->direction, t[2]->direction, u, v);
         sign = t[0]->sign;
     } else {
-        const auto at = [&](std::size_t i) -> const Vertex& { return scene.vertices[corner[i]]; };
+        const auto at = [&](std::size_t i) -> const Vertex& { return scene.vertices[corner[i] + block]; };
         std::array<Vec2, 3> st{at(0).uv, at(1).uv, at(2).uv};
-        if (material.normalTexture.uvSet == 1 && shape.firstSecondUv >= 0) {
-            const auto s = corners(scene.secondUvs, shape.firstSecondUv, shape, corner);
+        if (const int slot = material.normalTexture.uvSlot; slot > 0) {
+            const auto s =
+                corners(scene.furtherUvs, shape.firstFurtherUv + (slot - 1) * shape.vertices, shape, corner);
             st = {*s[0], *s[1], *s[2]};
         }
         const Vec2 d1 = st[1] - st[0], d2 = st[2] - st[0];

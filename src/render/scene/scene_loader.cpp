@@ -4,11 +4,14 @@
 #include <map>
 
 #include "render/gltf/gltf_camera.h"
-#include "render/gltf/gltf_check.h"
+#include "render/gltf/gltf_extensions.h"
 #include "render/gltf/gltf_file.h"
 #include "render/gltf/gltf_geometry.h"
+#include "render/gltf/gltf_instancing.h"
+#include "render/gltf/gltf_light.h"
 #include "render/gltf/gltf_material.h"
 #include "render/gltf/gltf_nodes.h"
+#include "render/gltf/gltf_variants.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {
@@ -28,20 +31,22 @@ class Loader {
         : file_(path, use),
           model_(file_.model()),
           geometry_(file_, scene_),
-          nodes_(file_, shutter, scene_.report.warnings) {
+          nodes_(file_, shutter, scene_.report.warnings),
+          bends_(file_, nodes_) {
         scene_.name = path.substr(path.find_last_of('/') + 1);
         scene_.shutter = shutter;
         scene_.animations = model_.animations.size();
     }
 
-    Scene load(const EnvironmentOptions& environment) {
+    Scene load(const EnvironmentOptions& environment, const SceneChoices& choices) {
+        if (!choices.variant.empty()) geometry_.setVariant(variantNamed(file_, choices.variant));
         checkExtensions();
         readMaterials();
         const std::vector<PlacedNode> placed = nodes_.placed();
+        if (model_.scenes.empty()) file_.fail("has no scene");
         readCameras(placed);
-        readNodes(placed);
+        readNodes(placed, choices.lightUnits);
         readEnvironment(environment);
-        if (const std::string fault = cameraFault(placed); !fault.empty()) file_.fail(fault);
         if (scene_.shapes.empty() && !scene_.environment)
             file_.fail("has no triangles and no environment (give one with --env-constant or --env)");
         completeScene(scene_);
@@ -58,7 +63,6 @@ class Loader {
     Scene loadCameras() {
         const std::vector<PlacedNode> placed = nodes_.placed();
         readCameras(placed);
-        if (const std::string fault = cameraFault(placed); !fault.empty()) warn(fault);
         return std::move(scene_);
     }
 
@@ -67,8 +71,7 @@ class Loader {
 
     void checkExtensions() {
         for (const std::string& name : model_.extensionsUsed)
-            if (!isSupported(name)) warn("the extension " + name + " is ignored");
-        if (!model_.skins.empty()) warn("skins are left at rest");
+            if (!isSupported(name)) warn("the extension " + name + " is ignored" + missingWithout(name));
     }
 
     void readMaterials() {
@@ -100,28 +103,42 @@ class Loader {
         return Course{shift(place.course->before), shift(place.course->after)};
     }
 
-    void readNodes(const std::vector<PlacedNode>& placed) {
+    void readNodes(const std::vector<PlacedNode>& placed, LightUnits units) {
+        const LightReader lights(file_, nodes_.scene(), units);
         std::map<std::size_t, std::vector<PlacedNode>> uses;  // mesh -> where
         std::vector<std::size_t> order;
         for (const PlacedNode& place : placed) {
             const tinygltf::Node& node = model_.nodes[place.node];
             const std::string what = described("node", place.node, node.name);
             if (const auto* light = extension(node.extensions, "KHR_lights_punctual")) {
-                readLight(static_cast<int>(number(*light, "light", -1)), place, what);
-                if (place.motion.moves())
-                    warn(what + ": its light stays where it is in the middle of the exposure");
+                readLight(lights, static_cast<int>(number(*light, "light", -1)), place, what);
             }
             if (node.mesh < 0) continue;
             const auto mesh = static_cast<std::size_t>(node.mesh);
             if (mesh >= model_.meshes.size())
                 file_.fail(what + " refers to mesh " + std::to_string(mesh) + ", the file has " +
                            std::to_string(model_.meshes.size()));
-            if (!usable(place.toWorld) || !std::ranges::all_of(place.motion.places, usable)) {
-                warn(what + " has a transform without an inverse: its mesh is left out");
+            const std::vector<Transform> instances = instancesOf(file_, node, what);
+            if (bends_.bends(place.node)) {
+                if (instances.size() != 1) warn(what + " bends: its instances are left out");
+                readBent(place);
                 continue;
             }
-            if (uses[mesh].empty()) order.push_back(mesh);
-            uses[mesh].push_back(place);
+            if (instances.size() > 1) checkCopies(mesh, instances.size(), what);
+            for (const Transform& instance : instances) {
+                PlacedNode own = place;
+                setInside(own, instance);
+                if (!usable(own.toWorld) || !std::ranges::all_of(own.motion.places, usable)) {
+                    warn(what + " has a transform without an inverse: its mesh is left out");
+                    continue;
+                }
+                if (uses[mesh].empty()) order.push_back(mesh);
+                uses[mesh].push_back(std::move(own));
+            }
+        }
+        if (!scene_.lights.empty()) {
+            scene_.report.lightUnits = lights.units();
+            if (!lights.told().empty()) scene_.report.notes.push_back(lights.told());
         }
         // Shapes of groups come after all others: group them at the end.
         std::vector<std::vector<Shape>> groups;
@@ -157,10 +174,44 @@ class Loader {
         }
     }
 
+    /// The place of an instance inside a node.
+    static void setInside(PlacedNode& place, const Transform& instance) {
+        place.toWorld = place.toWorld * instance;
+        for (Transform& at : place.motion.places) at = at * instance;
+        if (!place.course) return;
+        for (Motion* motion : {&place.course->before, &place.course->after})
+            for (Transform& at : motion->places) at = at * instance;
+    }
+
+    /// Meshes that shine are copied for each instance: not beyond some gigabytes.
+    void checkCopies(std::size_t mesh, std::size_t copies, const std::string& what) const {
+        constexpr std::size_t kMostVertices = std::size_t{1} << 26;
+        if (!emissive(mesh)) return;
+        std::size_t vertices = 0;
+        for (const tinygltf::Primitive& p : model_.meshes[mesh].primitives)
+            if (const auto found = p.attributes.find("POSITION"); found != p.attributes.end())
+                vertices += model_.accessors[static_cast<std::size_t>(found->second)].count;
+        if (vertices > kMostVertices / copies)
+            file_.fail(what + " has " + std::to_string(copies) + " instances of a mesh that shines, of " +
+                       std::to_string(vertices) +
+                       " vertices: these are copied, 2^26 vertices at most; let an unlit or dark "
+                       "material stand in");
+    }
+
+    /// A skinned or morphing mesh: in the world, as the scene has it at every moment.
+    void readBent(const PlacedNode& place) {
+        const auto mesh = static_cast<std::size_t>(model_.nodes[place.node].mesh);
+        const auto shapes = geometry_.readBent(
+            mesh, [&](int frame, double time) { return bends_.at(place.node, frame, time); },
+            scene_.shutter.frame != 0, bends_.causeOf(place.node));
+        scene_.shapes.insert(scene_.shapes.end(), shapes.begin(), shapes.end());
+    }
+
     bool emissive(std::size_t mesh) const {
         return std::ranges::any_of(model_.meshes[mesh].primitives, [&](const tinygltf::Primitive& p) {
-            return p.material >= 0 && static_cast<std::size_t>(p.material) < scene_.materials.size() &&
-                   scene_.materials[static_cast<std::size_t>(p.material)].emissive();
+            return scene_
+                .materials[geometry_.materialOf(p, described("mesh", mesh, model_.meshes[mesh].name))]
+                .shines();
         });
     }
 
@@ -177,12 +228,10 @@ class Loader {
         scene_.activeCamera = scene_.wantedCamera;
         if (!scene_.cameras.empty() && !scene_.cameras[scene_.wantedCamera].unusable.empty())
             scene_.activeCamera = firstOf([](const Camera& c) { return c.unusable.empty(); });
+        scene_.cameraFault = cameraFault(placed);
     }
 
-    /// Why there is no camera to render from, or nothing.
     std::string cameraFault(const std::vector<PlacedNode>& placed) const {
-        constexpr const char* remedy =
-            "; no option stands in for a camera: add a perspective one to the scene";
         if (model_.scenes.empty()) return "has no scene, and so no camera in one";
         std::string text;
         for (std::size_t i = 0; i < scene_.cameras.size(); ++i) {
@@ -191,62 +240,24 @@ class Loader {
             text += (i == 0 ? "has no camera that can be used: " : "; ") + described("camera", i, c.name) +
                     ": " + c.unusable;
         }
-        if (!text.empty()) return text + remedy;
+        if (!text.empty()) return text;
         for (std::size_t n = 0; n < model_.nodes.size(); ++n)
             if (model_.nodes[n].camera >= 0 &&
                 std::ranges::find(placed, n, &PlacedNode::node) == placed.end())
                 text += (text.empty() ? " (" : ", ") + described("node", n, model_.nodes[n].name);
-        if (text.empty()) return std::string("has no camera") + remedy;
+        if (text.empty()) return "has no camera";
         return "has no camera in its scene " + std::to_string(std::max(0, model_.defaultScene)) +
                "; those of the file" + text +
                ") are not in it: move one there, or make theirs the file's `scene`";
     }
 
-    void readLight(int index, const PlacedNode& place, const std::string& what) {
-        if (index < 0 || static_cast<std::size_t>(index) >= model_.lights.size())
-            file_.fail(what + " refers to light " + std::to_string(index) + ", the file has " +
-                       std::to_string(model_.lights.size()));
-        const tinygltf::Light& source = model_.lights[static_cast<std::size_t>(index)];
-        const tinygltf::Node& node = model_.nodes[place.node];
-        Light light;
-        light.name = node.name.empty() ? source.name : node.name;
-        Rgb colour{1, 1, 1};
-        if (source.color.size() == 3)
-            colour = {static_cast<float>(source.color[0]), static_cast<float>(source.color[1]),
-                      static_cast<float>(source.color[2])};
-        light.intensity = colour * static_cast<float>(source.intensity);
-        if (!isFinite(light.intensity) || light.intensity.x < 0 || light.intensity.y < 0 ||
-            light.intensity.z < 0)
-            file_.fail(what + ": the light's intensity must be finite and >= 0");
-        if (isBlack(light.intensity)) {
-            warn(what + ": the light has no power");
-            return;
-        }
-        light.position = place.toWorld.point({0, 0, 0});
-        const Vec3 axis = place.toWorld.vector({0, 0, -1});
-        const bool directed = source.type != "point";
-        if (directed && !(length(axis) > 0)) file_.fail(what + ": the light has no direction");
-        light.direction = directed ? normalized(axis) : Vec3{0, 0, -1};
-        const double radius = number(node.extras, "radius", number(source.extras, "radius", 0));
-        if (source.range > 0) light.range = static_cast<float>(source.range);
-        if (source.type == "directional") {
-            light.type = LightType::Directional;
-        } else if (source.type == "point" || source.type == "spot") {
-            light.type = radius > 0 ? LightType::Sphere : directed ? LightType::Spot : LightType::Point;
-            light.radius = static_cast<float>(std::max(0.0, radius));
-            if (light.type == LightType::Sphere) light.course = keep(shifts(place), {});
-            if (directed) {
-                const double inner = std::cos(source.spot.innerConeAngle);
-                const double outer = std::cos(source.spot.outerConeAngle);
-                const double scale = 1 / std::max(0.001, inner - outer);
-                light.coneScale = static_cast<float>(scale);
-                light.coneOffset = static_cast<float>(-outer * scale);
-            }
-        } else {
-            file_.fail(what + ": the light's type is '" + source.type +
-                       "', expected point, spot or directional");
-        }
-        scene_.lights.push_back(std::move(light));
+    void readLight(const LightReader& reader, int index, const PlacedNode& place, const std::string& what) {
+        std::optional<Light> light =
+            reader.read(index, model_.nodes[place.node], place.toWorld, what, scene_.report.warnings);
+        if (!light) return;
+        if (light->type == LightType::Sphere) light->course = keep(shifts(place), {});
+        scene_.lights.push_back(std::move(*light));
+        if (place.motion.moves()) warn(what + ": its light stays where it is in the middle of the exposure");
     }
 
     void readEnvironment(const EnvironmentOptions& options) {
@@ -275,12 +286,14 @@ class Loader {
     Scene scene_;
     GeometryReader geometry_;
     NodeTree nodes_;
+    Bends bends_;
 };
 
 }  // namespace
 
-Scene loadScene(const std::string& path, const EnvironmentOptions& environment, const Shutter& shutter) {
-    return Loader(path, shutter).load(environment);
+Scene loadScene(const std::string& path, const EnvironmentOptions& environment, const Shutter& shutter,
+                const SceneChoices& choices) {
+    return Loader(path, shutter).load(environment, choices);
 }
 
 Scene loadCameras(const std::string& path, const Shutter& shutter) {

@@ -48,11 +48,11 @@ class Texture {
     std::vector<float> floats_;
 };
 
-/// How a material refers to a texture: an index into the scene's textures (-1: none), one of two sets of
-/// coordinates, and KHR_texture_transform's affine map of them.
+/// How a material refers to a texture: an index into the scene's textures (-1: none), a set of coordinates
+/// (0: TEXCOORD_0; n: the material's furtherUvSets[n - 1]), and KHR_texture_transform's affine map of them.
 struct TextureRef {
     int texture = -1;
-    int uvSet = 0;
+    int uvSlot = 0;
     bool transformed = false;
     Vec2 offset{0, 0};
     Vec2 rowU{1, 0};  ///< u' = rowU . uv + offset.x

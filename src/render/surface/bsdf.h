@@ -62,17 +62,23 @@ BsdfValue BasicBsdf<F>::coatReflection(const Vec3& wi) const {
     return {Rgb(coatFresnel(m.cosH) * m.value), m.pdf};
 }
 
+template <Features F>
+float BasicBsdf<F>::retroFactor(const Vec3& wi) const {
+    const float more = retroRoughness_ * (1 + dot(wo_, wi)) - 0.5f;
+    return (1 + more * schlickWeight(wo_.z)) * (1 + more * schlickWeight(wi.z));
+}
+
 /// Diffuse and multiple-scattering lobes: cosine-sampled.
 template <Features F>
-BsdfValue BasicBsdf<F>::diffuse(float cosI) const {
+BsdfValue BasicBsdf<F>::diffuse(const Vec3& wi) const {
     if (!isBlack(diffuse_)) countEffect(Effect::Diffuse);
-    if constexpr (!F.reflection) {
-        const float pdf = cosI * kInvPi;
-        return {diffuse_ * pdf, pdf};
-    }
-    const Albedo atI = row_.at(cosI);
-    const Rgb f = diffuse_ * (Rgb(1) - dielectricAlbedo(atI)) + multiple_ * (1 - atI.whole);
-    const float pdf = cosI * kInvPi;
+    const float pdf = wi.z * kInvPi;
+    const bool retro = retroRoughness_ >= 0;
+    const Rgb body = retro ? diffuse_ * retroFactor(wi) : diffuse_;
+    if constexpr (!F.reflection) return {body * pdf, pdf};
+    const Albedo atI = row_.at(wi.z);
+    const Rgb entering = retro ? Rgb(1) : Rgb(1) - dielectricAlbedo(atI);
+    const Rgb f = body * entering + multiple_ * (1 - atI.whole);
     return {f * pdf, pdf};
 }
 
@@ -108,7 +114,7 @@ BsdfValue BasicBsdf<F>::lobes(const Vec3& wi) const {
         sum.pdf += v.pdf * probability_[lobe];
     };
     if (wi.z > 0) {
-        if (probability_[kDiffuse] > 0) add(kImage ? BsdfValue{{}, wi.z * kInvPi} : diffuse(wi.z), kDiffuse);
+        if (probability_[kDiffuse] > 0) add(kImage ? BsdfValue{{}, wi.z * kInvPi} : diffuse(wi), kDiffuse);
         if (F.reflection && probability_[kReflection] > 0 && !smooth_) add(baseReflection(wi), kReflection);
         if (F.layers && probability_[kCoat] > 0 && !coatSmooth_) add(coatReflection(wi), kCoat);
         if (F.layers && probability_[kSheen] > 0) add(sheen(wi), kSheen);

@@ -33,6 +33,7 @@ BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromIns
       up_(trueNormal),
       alpha_(square(s.roughness)),
       coatAlpha_(square(s.clearcoatRoughness)),
+      retroRoughness_(s.retro ? s.roughness : -1),
       smooth_(alpha_ < kSmoothAlpha),
       coatSmooth_(coatAlpha_ < kSmoothAlpha),
       coat_(s.clearcoat),
@@ -108,8 +109,9 @@ void BasicBsdf<F>::setReflecting(const SurfaceParameters& s, bool fromInside, fl
     const Rgb entering = Rgb(1) - dielectricAlbedo(atO);
     const Rgb meanDielectric = dielectricAlbedo(mean);
     const Rgb rest = inverseRest(meanDielectric);
-    const Rgb body = minimum(s.baseColour * rest, 1.f) * entering * (opaque_ * base_);
-    diffuse_ = body * rest;
+    const Rgb body = (s.retro ? minimum(s.baseColour, 1.f) : minimum(s.baseColour * rest, 1.f) * entering) *
+                     (opaque_ * base_);
+    diffuse_ = s.retro ? body : body * rest;
 
     // Smooth glass without a change of index neither bends nor spreads light.
     glassSmooth_ = smooth_ || std::abs(eta_ - 1) < 1e-3f;
@@ -142,7 +144,10 @@ void BasicBsdf<F>::leaveAbove() {
     } else {
         const Albedo& mean = row_.mean();
         const Albedo above = row_.meanAbove(up_.z);
-        diffuse_ *= (Rgb(1) - dielectricAlbedo(mean)) * inverseRest(dielectricAlbedo(above)) * whole;
+        const Rgb entering = retroRoughness_ < 0
+                                 ? (Rgb(1) - dielectricAlbedo(mean)) * inverseRest(dielectricAlbedo(above))
+                                 : Rgb(1);
+        diffuse_ *= entering * whole;
         multiple_ *= (1 - mean.whole) * inverseRest(above.whole) * whole;
     }
 }

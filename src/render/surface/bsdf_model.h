@@ -18,6 +18,7 @@ struct SurfaceParameters {
     Rgb baseColour{1, 1, 1};
     float metallic = 0;
     float roughness = 1;
+    bool retro = false;  ///< diffuse light as in Disney's model
     float transmission = 0;
     float ior = 1.5f;
     float specular = 1;
@@ -64,6 +65,10 @@ struct BsdfSample {
 ///   is not reflected enters. Reciprocal. c = min(1, base colour / (1 - mean Ed)), so that the base colour is
 ///   the diffuse reflectance that one sees beneath the reflection (as in Disney's and Cycles' models, which
 ///   take nothing off it), as far as energy allows: a white surface returns exactly what it gets.
+///   With `retro` it is instead as Cycles has it up to Blender 3.6 (Burley, "Physically-based shading at
+///   Disney", 2012): c / pi (1 + (r - 1/2) (1 - cos wo)^5) (1 + (r - 1/2) (1 - cos wi)^5), c the base colour,
+///   r = roughness (1 + cosine between wo and wi). Nothing is taken off for the reflection, rough surfaces
+///   shine at grazing angles: white ones return more than they get.
 /// - glass (weight (1-metallic) transmission): reflection and refraction by the exact Fresnel term,
 /// refraction
 ///   tinted by the base colour; rough glass is divided by its single-scattering albedo. The surface bounds a
@@ -119,7 +124,8 @@ class BasicBsdf {
     float coatFresnel(float cosH) const;
     BsdfValue baseReflection(const Vec3& wi) const;
     BsdfValue coatReflection(const Vec3& wi) const;
-    BsdfValue diffuse(float cosI) const;
+    BsdfValue diffuse(const Vec3& wi) const;
+    float retroFactor(const Vec3& wi) const;
     BsdfValue glass(const Vec3& wi) const;
     BsdfValue sheen(const Vec3& wi) const;
     void leaveOut(const EffectSet& effects);
@@ -142,6 +148,7 @@ class BasicBsdf {
     Vec3 up_;  ///< the true normal
     float alpha_;
     float coatAlpha_;
+    float retroRoughness_;   ///< -1: the surface is not of that kind
     float lambdaO_ = 0;      ///< of the base's GGX at wo
     float coatLambdaO_ = 0;  ///< of the coat's
     bool smooth_;            ///< the base reflects as a delta function

@@ -19,10 +19,19 @@ Rgba vertexColourAt(const Scene& scene, const Shape& shape, const std::array<std
                     float u, float v);
 
 /// The normal of the material's normal map in the frame of `normal`. The tangent is the vertices' own or,
-/// without one, the direction in which u grows over the triangle.
+/// without one, the direction in which u grows over the triangle; `block`: of a deforming shape, as in
+/// Between.
 Vec3 mappedNormal(const Scene& scene, const Shape& shape, const Material& material,
                   const std::array<std::uint32_t, 3>& corner, float u, float v, const TextureCoordinates& uv,
-                  const Vec3& normal);
+                  const Vec3& normal, std::uint32_t block);
+
+/// A corner of a shape that deforms at a moment.
+inline Vertex cornerAt(const Scene& scene, std::uint32_t corner, const Between& moment) {
+    const Vertex& a = scene.vertices[corner + moment.before];
+    const Vertex& b = scene.vertices[corner + moment.after];
+    const float w = 1 - moment.part;
+    return {a.position * w + b.position * moment.part, a.normal * w + b.normal * moment.part, a.uv};
+}
 
 /// A shading normal turned just so far towards the viewer that it faces him: interpolated and mapped normals
 /// may not.
@@ -41,9 +50,26 @@ SurfacePoint surfacePoint(const Scene& scene, const Hit& hit, const Vec3& rayDir
     p.material = &scene.materials[shape.material];
     p.triangle = shape.firstTriangle + hit.triangle;
     const auto& corner = scene.triangles[p.triangle];
-    const Vertex& a = scene.vertices[corner[0]];
-    const Vertex& b = scene.vertices[corner[1]];
-    const Vertex& c = scene.vertices[corner[2]];
+    std::array<const Vertex*, 3> vertex;
+    for (std::size_t i = 0; i < 3; ++i) vertex[i] = &scene.vertices[corner[i]];
+    [[maybe_unused]] std::array<Vertex, 3> moved;
+    std::uint32_t block = 0;
+    if constexpr (F.rare) {
+        const std::uint32_t steps =
+            shape.deformation < 0 ? 1 : scene.deformations[static_cast<std::size_t>(shape.deformation)].steps;
+        if (steps > 1) {
+            countEffect(Effect::ObjectMotion);
+            const Between moment = blocksAt(shape, 0, steps, time);
+            for (std::size_t i = 0; i < 3; ++i) {
+                moved[i] = cornerAt(scene, corner[i], moment);
+                vertex[i] = &moved[i];
+            }
+            block = moment.part < 0.5f ? moment.before : moment.after;
+        }
+    }
+    const Vertex& a = *vertex[0];
+    const Vertex& b = *vertex[1];
+    const Vertex& c = *vertex[2];
     const float w = 1 - hit.u - hit.v;
 
     p.position = a.position * w + b.position * hit.u + c.position * hit.v;
@@ -55,7 +81,7 @@ SurfacePoint surfacePoint(const Scene& scene, const Hit& hit, const Vec3& rayDir
     if constexpr (F.textures) {
         if (p.material->textured) p.uv = textureCoordinates(scene, shape, p.triangle, hit.u, hit.v);
         if (p.material->normalTexture)
-            shading = mappedNormal(scene, shape, *p.material, corner, hit.u, hit.v, p.uv, shading);
+            shading = mappedNormal(scene, shape, *p.material, corner, hit.u, hit.v, p.uv, shading, block);
         if (shape.firstColour >= 0) p.colour = vertexColourAt(scene, shape, corner, hit.u, hit.v).rgb;
     }
     if (hit.instance >= 0) {
@@ -94,6 +120,7 @@ SurfaceParameters parametersAt(const Scene& scene, const SurfacePoint& point) {
     s.baseColour = F.textures ? m.baseColour * point.colour : m.baseColour;
     s.metallic = m.metallic;
     s.roughness = m.roughness;
+    s.retro = m.retro;
     s.transmission = m.transmission;
     s.ior = m.ior;
     s.specular = m.specular;

@@ -72,8 +72,8 @@ def end():
 atexit.register(end)
 
 
-def copy_to_render(temporary):
-    """What is in memory: bpy.data.is_dirty does not know what scripts have changed."""
+def file_to_render(temporary):
+    """A copy of what is open: changes by scripts do not make a file dirty."""
     path = os.path.join(temporary, os.path.basename(bpy.data.filepath) or "untitled.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False, relative_remap=True)
     return path
@@ -88,7 +88,7 @@ def command(context, animation, temporary):
     os.makedirs(os.path.dirname(output) or ".", exist_ok=True)
     frames = f"{scene.frame_start}-{scene.frame_end}x{scene.frame_step}" if animation else str(scene.frame_current)
     program = context.preferences.addons[__package__].preferences.program
-    words = [bpy.path.abspath(program), copy_to_render(temporary), "-o", output, "--frames", frames, "--images", str(settings.images),
+    words = [bpy.path.abspath(program), file_to_render(temporary), "-o", output, "--frames", frames, "--images", str(settings.images),
              "--spp", str(settings.samples), "--view-layer", context.view_layer.name, "--blender", bpy.app.binary_path,
              "--overwrite", "--log", "json"]
     if settings.use_target:
