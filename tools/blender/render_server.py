@@ -27,6 +27,9 @@ def setting(of, name, value):
         setattr(of, name, value)
 
 
+FIRST_TILE = {"<UDIM>": "1001", "<UVTILE>": "u1_v1"}  # what Blender's names of tiled images stand for
+
+
 def missing_files():
     """Files that the scene names and that are not there."""
     used = [image for image in bpy.data.images
@@ -35,7 +38,9 @@ def missing_files():
     used += [*bpy.data.libraries, *bpy.data.volumes, *bpy.data.cache_files]
     missing = set()
     for data in used:
-        path = bpy.path.abspath(data.filepath, library=data.library).replace("<UDIM>", "1001").replace("<UVTILE>", "u1_v1")
+        path = bpy.path.abspath(data.filepath, library=data.library)
+        for token, tile in FIRST_TILE.items():
+            path = path.replace(token, tile)
         if path and not os.path.exists(path):
             missing.add(path)
     return sorted(missing)

@@ -75,10 +75,9 @@
 ///
 /// R, G and B of a pixel whose mean is not negative are not, unless further radiance channels are named
 /// (parts of light must add up). A, the coverage that radiance is premultiplied with, has the same weights as
-/// far as its noise explains what the mean of the pixel's samples says otherwise (drift/finishing.h): edges
-/// of coverage are the samples' own, smoke and what is out of focus are smooth. Where samples agree on 0 or 1
-/// it stays so, but where coverage changes slowly and their neighbours say that it was chance. It is kept
-/// within 0 to 1.
+/// far as its noise explains what the mean of the pixel's samples says otherwise (drift/finishing.h). Where
+/// samples agree on 0 or 1 it stays so, unless those around show that it was chance. It is kept within 0
+/// to 1.
 namespace vlx {
 
 /// Frames on either side that add to one of a Sequence, at most.

@@ -127,8 +127,8 @@ void Finishing::cleanRow(int y) {
 void Finishing::errorRow(int y) {
     Light::Row row(width_);
     const auto w = static_cast<std::size_t>(width_);
-    const std::vector<float> sums = alikeSums(y);
-    coverageRow(y, sums.data() + 4 * w);
+    const std::vector<float> sums = sharedVariances(y);
+    coverageRow(y);
     std::vector<float> unexplained(static_cast<std::size_t>(width_)), known(unexplained.size());
     for (int x = 0; x < width_; ++x) {
         const double n = data_.row(planes_.count(), y)[x];
@@ -304,18 +304,15 @@ bool Finishing::isExact(int x, int y) const {
     return true;
 }
 
-/// Rows of sums over the pixels of alike features around each pixel of row y: of the variances of R, G, B of
-/// the mean of the two halves' estimates, from their differences; of 1; where there is alpha, of
-/// (K - M)^2 and (1 - h) v (coverageRow).
-std::vector<float> Finishing::alikeSums(int y) const {
-    const int rows = layout_.alpha >= 0 ? 6 : 4;
-    std::vector<float> sums(static_cast<std::size_t>(rows) * static_cast<std::size_t>(width_));
+/// Variances of R, G, B of the mean of the two halves' estimates, from their differences, over the pixels of
+/// alike features around each pixel of row y: three rows, and one of weights.
+std::vector<float> Finishing::sharedVariances(int y) const {
+    std::vector<float> sums(4 * static_cast<std::size_t>(width_));
     sumAlike(
-        features_, layout_.features, kAlikeReach, rows,
+        features_, layout_.features, kAlikeReach, 4,
         [&](int row, int c, float* q) {
-            if (c >= 3) {
-                for (int x = 0; x < width_; ++x)
-                    q[x] = c == 3 ? 1.f : static_cast<float>(coverageMoment(c == 4, x, row));
+            if (c == 3) {
+                std::fill_n(q, width_, 1.f);
                 return;
             }
             const float* const a = combined_.row(combinedPlanes_.half(0) + c, row);
@@ -326,49 +323,47 @@ std::vector<float> Finishing::alikeSums(int y) const {
     return sums;
 }
 
-/// Of a pixel's alpha, M the mean of its samples and K the kriging's: (K - M)^2 (`apart`), or
-/// (1 - h) v, where v = (M_A - M_B)^2 n_A n_B / (n_A + n_B)^2 is the variance of M as the halves show it
-/// and h what M weighs in K: the part of the former that the noise of M explains.
-double Finishing::coverageMoment(bool apart, int x, int y) const {
+/// Of a pixel's alpha: M, K, and (1 - h) v, the part of (K - M)^2 that the noise of M explains, where
+/// v = (M_A - M_B)^2 n_A n_B / (n_A + n_B)^2 is the variance of M as the halves show it, h what M weighs in
+/// K.
+Finishing::Coverage Finishing::coverageAt(int x, int y) const {
     const double nA = data_.row(planes_.halfCount(0), y)[x], nB = data_.row(planes_.halfCount(1), y)[x];
-    if (nA + nB <= 0) return 0;
-    if (apart) {
-        const double step =
-            static_cast<double>(combined_.row(combinedPlanes_.value() + layout_.alpha, y)[x]) -
-            plainMean(data_, planes_, layout_.alpha, x, y);
-        return step * step;
-    }
-    if (nA == 0 || nB == 0) return 0;
+    Coverage of;
+    of.kriged = combined_.row(combinedPlanes_.value() + layout_.alpha, y)[x];
+    of.mean = nA + nB > 0 ? plainMean(data_, planes_, layout_.alpha, x, y) : of.kriged;
+    if (nA == 0 || nB == 0) return of;
     const double differ = static_cast<double>(data_.row(planes_.mean(0) + layout_.alpha, y)[x]) -
                           static_cast<double>(data_.row(planes_.mean(1) + layout_.alpha, y)[x]);
     const double leverage = std::clamp<double>(combined_.row(combinedPlanes_.leverage(), y)[x], 0, 1);
-    return (1 - leverage) * differ * differ * nA * nB / ((nA + nB) * (nA + nB));
+    of.noise = (1 - leverage) * differ * differ * nA * nB / ((nA + nB) * (nA + nB));
+    return of;
 }
 
-/// Whether the kriging's alpha changes by more than a half within `reach`.
-bool Finishing::isBorder(int x, int y, int reach) const {
-    float least = 1, most = 0;
-    for (int row = std::max(0, y - reach); row <= std::min(height_ - 1, y + reach); ++row) {
-        const float* const alpha = combined_.row(combinedPlanes_.value() + layout_.alpha, row);
-        const auto [low, high] =
-            std::minmax_element(alpha + std::max(0, x - reach), alpha + std::min(width_, x + reach + 1));
-        least = std::min(least, *low);
-        most = std::max(most, *high);
-    }
-    return most - least > 0.5f;
-}
-
-void Finishing::coverageRow(int y, const float* sums) {
+void Finishing::coverageRow(int y) {
     if (layout_.alpha < 0) return;
+    const int top = std::max(0, y - kReach), rows = std::min(height_ - 1, y + kReach) - top + 1;
+    std::vector<Coverage> around(static_cast<std::size_t>(rows * width_));
+    for (int row = 0; row < rows; ++row)
+        for (int x = 0; x < width_; ++x)
+            around[static_cast<std::size_t>(row * width_ + x)] = coverageAt(x, top + row);
     float* const alpha = clean_.row(cleanPlanes_.value() + layout_.alpha, y);
     for (int x = 0; x < width_; ++x) {
-        if (data_.row(planes_.count(), y)[x] == 0) continue;
-        const double mean = plainMean(data_, planes_, layout_.alpha, x, y), value = alpha[x];
-        double own = shrinkage(sums[x], sums[width_ + x]);
-        const bool agree = coverage(mean) == 0 || coverage(mean) == 1;
-        if (agree && (own >= 0.5 || isBorder(x, y, kReach))) own = 1;
-        if (own < 1 && isBorder(x, y, 1)) own = (3 + own) / 4;
-        alpha[x] = static_cast<float>(own < 1 ? value + own * (mean - value) : mean);
+        const Coverage& own = around[static_cast<std::size_t>((y - top) * width_ + x)];
+        const bool agree = coverage(own.mean) == 0 || coverage(own.mean) == 1;
+        double apart = 0, noise = 0, expected = 0, found = 0;
+        for (int row = 0; row < rows; ++row)
+            for (int col = std::max(0, x - kReach); col <= std::min(width_ - 1, x + kReach); ++col) {
+                const Coverage& there = around[static_cast<std::size_t>(row * width_ + col)];
+                apart += (there.kriged - there.mean) * (there.kriged - there.mean);
+                noise += there.noise;
+                const double away = std::abs(there.kriged - own.mean);
+                if (away > std::abs(own.kriged - own.mean)) continue;
+                expected += away;
+                found += std::abs(there.mean - own.mean);
+            }
+        const bool certain = agree && found < expected / 2;
+        const double kept = certain ? 1 : shrinkage(apart, noise);
+        alpha[x] = static_cast<float>(kept < 1 ? alpha[x] + kept * (own.mean - alpha[x]) : own.mean);
     }
 }
 

@@ -29,7 +29,7 @@ struct NoiseCorrelation {
 class Finishing {
   public:
     static constexpr int kAlikeReach = 2;  ///< of the error map: 5 x 5 pixels
-    static constexpr int kReach = 4;       ///< how far alpha looks for an edge
+    static constexpr int kReach = 4;       ///< of alpha: 9 x 9 pixels
 
     /// `combined`: CombinedPlanes, instead of the level's own; `clean`: CleanPlanes; `light`: LightPlanes;
     /// `common`: CommonErrorPlanes.
@@ -46,12 +46,11 @@ class Finishing {
     /// combined rows y - kReach to y + kReach are there.
     ///
     /// Alpha: K + s (M - K), M the mean of the pixel's samples, K the kriging's, s the share of what they
-    /// differ by that the noise of M does not explain, shrinkage(sum (K - M)^2, sum (1 - h) v) over the
-    /// pixels of alike features in 5 x 5: with 1 - s the weight of K of least squared error, since E[(K -
-    /// M)^2] is K's squared error + (1 - 2 h) v. Where K changes by more than a half from a pixel to the
-    /// next, few pixels tell and errors differ: a quarter of that weight keeps 7/16 of its gain, and 1/16 of
-    /// its loss where it is wrong. Samples that agree on 0 or 1 keep their word within kReach of such an
-    /// edge, and wherever s is 1/2 or more.
+    /// differ by that the noise of M does not explain, shrinkage(sum (K - M)^2, sum (1 - h) v) over 9 x 9
+    /// pixels: with 1 - s the weight of K of least squared error, since E[(K - M)^2] is K's squared error +
+    /// (1 - 2 h) v. Where samples agree on 0 or 1, K must be right about such pixels to be heard: of those
+    /// that it puts as near to that value or nearer, samples must show half of what it says that they are
+    /// off, which is all if it is right and nothing if it is wrong; else s is 1.
     void errorRow(int y);
     struct Counts {
         std::int64_t exact = 0;  ///< pixels
@@ -67,10 +66,12 @@ class Finishing {
   private:
     double sampleVariance(int c, int x, int y) const;
     bool isExact(int x, int y) const;
-    std::vector<float> alikeSums(int y) const;
-    double coverageMoment(bool apart, int x, int y) const;
-    bool isBorder(int x, int y, int reach) const;
-    void coverageRow(int y, const float* sums);
+    std::vector<float> sharedVariances(int y) const;
+    struct Coverage {
+        double kriged = 0, mean = 0, noise = 0;
+    };
+    Coverage coverageAt(int x, int y) const;
+    void coverageRow(int y);
     double halvesApart(int x, int y) const;
     NoiseCorrelation neighboursInRow(int y) const;
     double meanVariance(int c, int x, int y) const;
