@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "finished.h"
 #include "frames.h"
 #include "progress_bar.h"
 #include "render/film/render.h"
-#include "render/gltf/gltf_references.h"
+#include "render/gltf/check/gltf_files.h"
 #include "render/pilot/choose_integrator.h"
 #include "render/pilot/pilot.h"
 #include "render/plan/plan.h"
@@ -124,6 +125,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     o.render.follow(plan);
     if (plan.motion.recorded) note(o, "motion is recorded: " + plan.motion.reason);
     const Accelerator accelerator(loaded, o.render.path.effects);
+    if (o.tellsView) warnOfBacks(o, loaded, accelerator);
     const IntegratorChoice choice = chooseIntegrator(o, loaded, accelerator);
     if (!o.explain.empty()) return printPlan(o, loaded, plan, choice);
     o.render.integrator = choice.chosen;
@@ -152,8 +154,10 @@ int run(TraceOptions& o) {
     vlx::ProgressBar bar("tracing");
     if (o.frames.empty()) return runOne(o, bar);
     vlx::requireFramePlace("--output", o.dump);
+    bool told = false;
     vlx::forEachFrame(vlx::parseFrames(o.frames), bar, [&](int number, const vlx::Progress& progress) {
         TraceOptions one = ofFrame(o, number);
+        one.tellsView = !std::exchange(told, true);
         runOne(one, progress);
     });
     return vlx::kDone;

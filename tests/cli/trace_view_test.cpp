@@ -70,6 +70,7 @@ TEST(MadeCamera, ShowsTheWholeSceneAndCanBeCopied) {
     EXPECT_LT(v.covered(), 0.9);
     const ToolRun copied = v.run(optionsIn(made.err), "b.exr");
     ASSERT_EQ(copied.exitCode, 0) << copied.err;
+    EXPECT_FALSE(says(copied, "one is made")) << copied.err;
     EXPECT_EQ(v.samples("b.exr").values, v.samples().values);
     const ToolRun close = v.run({"--fov", "20"}, "c.exr");  // from further away
     EXPECT_NEAR(v.covered("c.exr"), v.covered(), 0.1) << close.err;
@@ -94,7 +95,10 @@ TEST(MadeCamera, IsOneForAllFrames) {
     ASSERT_EQ(run.exitCode, 0) << run.err;
     const auto view = [&](const char* name) { return DumpReader(v.folder / name).header().worldToCamera; };
     EXPECT_EQ(view("a_0.exr"), view("a_2.exr"));
-    EXPECT_EQ(optionsIn(run.err), optionsIn(v.run({}).err));
+    EXPECT_EQ(run.err.find("one is made"), run.err.rfind("one is made")) << run.err;
+    // All that moves is in it, from the first frame to the last key.
+    EXPECT_EQ(optionsIn(run.err), optionsIn(v.run({"--shutter", "0,1"}).err));
+    EXPECT_NE(optionsIn(run.err), optionsIn(v.run({}).err));
     const ToolRun still = v.run({"--frames", "1", "--fps", "2", "--camera-position", "2,0,20"}, "b_#.exr");
     EXPECT_TRUE(says(still, "motion is recorded")) << still.err;
 }
@@ -168,6 +172,25 @@ TEST(Light, ThatReachesNothingIsWarnedOf) {
     EXPECT_TRUE(says(dark, "--env-constant 1,1,1 or --env IMAGE")) << dark.err;
     EXPECT_FALSE(says(dark, "mean luminance")) << dark.err;
     EXPECT_FALSE(says(v.run({"--env-constant", "1,1,1"}), "no light reaches"));
+}
+
+TEST(Light, IsNotMissedWhereAllIsUnlit) {
+    GltfText g;
+    g.json["extensionsUsed"].push_back("KHR_materials_unlit");
+    g.json["materials"][0]["extensions"]["KHR_materials_unlit"] = nlohmann::json::object();
+    const Viewed v(g);
+    EXPECT_FALSE(says(v.run({}), "no light reaches"));
+}
+
+TEST(Backs, ThatFillThePictureAreToldOf) {
+    GltfText g;
+    g.json["nodes"][0]["rotation"] = {0, 1, 0, 0};
+    const Viewed v(g);
+    const ToolRun back = v.run({});
+    EXPECT_TRUE(says(back, "100 % of what is in the picture shows its back")) << back.err;
+    EXPECT_TRUE(says(back, "doubleSided")) << back.err;
+    g.json["materials"][0]["doubleSided"] = true;
+    EXPECT_FALSE(says(Viewed(g).run({}), "shows its back"));
 }
 
 TEST(Light, OfUnlikelyUnitsIsWarnedOf) {

@@ -257,7 +257,14 @@ TEST(BadSkins, NameThePlace) {
     Skinned circle;
     circle.json["nodes"][3]["children"] = {4};
     circle.json["nodes"][4]["children"] = {3};
-    expectFault("more than one parent", circle);
+    expectFault("node 3 'left' is below itself: it is a child of node 4 'right'", circle);
+    const Scene halved =
+        loadBent(Skinned(joints, {1, 0, 0, 0, 0.5f, 0, 0, 0, 1, 0, 0, 0, 0.5f, 0.25f, 0, 0}));
+    ASSERT_EQ(halved.report.warnings.size(), 1u);
+    EXPECT_EQ(
+        halved.report.warnings[0],
+        "mesh 0 'square': the weights of 2 of its 4 vertices do not add up to 1 (those of vertex 1 to 0.5): "
+        "they are scaled to it");
     Skinned none;
     none.json["skins"][0]["joints"] = nlohmann::json::array();
     expectFault("has no joints", none);

@@ -214,6 +214,119 @@ TEST(Values, OfTheWrongTypeAreRefused) {
     }
 }
 
+TEST(Values, OutOfRangeAreTakenAsTheNearestAndToldOf) {
+    GltfText g;
+    g.json["materials"][0]["pbrMetallicRoughness"] = {
+        {"baseColorFactor", {5, -1, 0.5, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1.5}};
+    g.json["nodes"][0]["rotation"] = {0, 0, 0, 2};
+    const Scene s = load(g.json, g);
+    EXPECT_EQ(s.materials[0].baseColour, (Rgb{1, 0, 0.5f}));
+    EXPECT_EQ(s.materials[0].roughness, 1);
+    EXPECT_EQ(s.boundsMax.x, 1);
+    EXPECT_EQ(
+        s.report.warnings,
+        (std::vector<std::string>{
+            "nodes[0].rotation: expected a quaternion of length 1, found [0,0,0,2]: it is normalised",
+            "materials[0].pbrMetallicRoughness.baseColorFactor: expected numbers from 0 to 1, found "
+            "[5,-1,0.5,1]: the nearest are taken",
+            "materials[0].pbrMetallicRoughness.roughnessFactor: expected 0 to 1, found 1.5: the nearest is "
+            "taken"}));
+    g.json["materials"].clear();
+    for (int i = 0; i < 12; ++i)
+        g.json["materials"].push_back({{"pbrMetallicRoughness", {{"metallicFactor", 2}}}});
+    EXPECT_EQ(load(g.json, g).report.warnings.back(), "and 3 values more that are out of range");
+}
+
+TEST(Values, OfSeveralWordsAreOneOfThem) {
+    GltfText g;
+    g.json["meshes"][0]["primitives"][0]["mode"] = 9;
+    expectFailureWith({"meshes[0].primitives[0].mode: expected a whole number of 0 to 6, found 9"}, g.json,
+                      g);
+    GltfText alpha;
+    alpha.json["materials"][0]["alphaMode"] = "CLIP";
+    expectFailureWith({"materials[0].alphaMode: expected one of OPAQUE, MASK, BLEND, found \"CLIP\""},
+                      alpha.json, alpha);
+}
+
+TEST(Version, OtherThanTwoIsRefused) {
+    const auto of = [](const json& asset) {
+        GltfText g;
+        g.json["asset"] = asset;
+        return failure(g.json, g);
+    };
+    EXPECT_EQ(of({{"version", "2.0"}}), "no error");
+    EXPECT_EQ(of({{"version", "2.1"}, {"minVersion", "2.0"}}), "no error");
+    EXPECT_NE(of({{"version", "1.0"}}).find("expected glTF 2.0, found 1.0; turn it into 2.0"),
+              std::string::npos);
+    EXPECT_NE(of({{"version", "3.0"}}).find("expected glTF 2.0, found 3.0"), std::string::npos);
+    EXPECT_NE(of({{"version", "2.1"}, {"minVersion", "2.1"}}).find("found a need for 2.1"),
+              std::string::npos);
+    EXPECT_NE(of({{"version", 2}}).find("asset.version: expected a string, found 2"), std::string::npos);
+    EXPECT_NE(of(json()).find("JSON without `asset`"), std::string::npos);
+}
+
+TEST(Files, OfBuffersMustBeThere) {
+    const TemporaryFolder folder;
+    const auto of = [&](const std::string& uri) {
+        GltfText g;
+        g.json["buffers"] = {{{"byteLength", 60}, {"uri", uri}}};
+        writeText(folder / "scene.gltf", g.json.dump());
+        try {
+            loadScene(folder / "scene.gltf");
+        } catch (const Error& e) {
+            return std::string(e.what());
+        }
+        return std::string("no error");
+    };
+    const auto expectWord = [&](const std::string& uri, const std::string& word) {
+        const std::string message = of(uri);
+        EXPECT_NE(message.find("buffers[0].uri: expected "), std::string::npos) << message;
+        EXPECT_NE(message.find(word), std::string::npos) << word << " in: " << message;
+        EXPECT_LT(message.size(), 250u) << message;
+    };
+    expectWord("gone.bin", "'gone.bin', found no such file");
+    expectWord(".", "found a folder");
+    expectWord("/dev/zero", "found a pipe or device");
+    expectWord("data:model/other;base64," + std::string(10000, 'A'), "found data:model/other;base64");
+    expectWord("data:" + std::string(10000, 'A'), "found data:AAA");
+    std::filesystem::create_directory(folder / "a.glb");
+    try {
+        loadScene(folder / "a.glb");
+        ADD_FAILURE() << "a folder was read";
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("expected a glTF file, found a folder"), std::string::npos)
+            << e.what();
+    }
+}
+
+TEST(Places, BeyondWhatFloatsCanTurnAreRefused) {
+    for (const double scale : {1e10, 1e18, 1e30}) {
+        GltfText g;
+        g.json["nodes"][0]["scale"] = {scale, scale, scale};
+        expectFailureWith({"m from the origin, expected at most 1e9 m", "scales"}, g.json, g);
+    }
+    GltfText far;
+    far.poke(0, -2e18f);
+    expectFailureWith({"reaches 2e+18 m from the origin"}, far.json, far);
+    GltfText light;
+    light.json["nodes"][2]["translation"] = {0, 0, 1e19};
+    light.json["nodes"][2]["extras"]["radius"] = 1;
+    expectFailureWith({"node 2", "the light is more than 1e9 m from the origin"}, light.json, light);
+    GltfText fine;
+    fine.json["nodes"][0]["scale"] = {1e8, 1e8, 1e8};
+    EXPECT_EQ(failure(fine.json, fine), "no error");
+}
+
+TEST(Nodes, InALongChainAreRead) {
+    constexpr int kLength = 100000;
+    GltfText g;
+    json& nodes = g.json["nodes"];
+    for (int i = 0; i < kLength; ++i)
+        nodes.push_back({{"children", {i + 1 < kLength ? 4 + i : 0}}, {"translation", {1e-5, 0, 0}}});
+    g.json["scenes"][0]["nodes"] = {1, 2, 3};
+    EXPECT_NEAR(load(g.json, g).boundsMax.x, 2, 1e-5);
+}
+
 TEST(Values, ThatNoDoubleHoldsAreRefused) {
     GltfText g;
     std::string text = g.text();

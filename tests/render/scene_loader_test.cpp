@@ -9,7 +9,7 @@
 
 #include "../base/temporary_folder.h"
 #include "gltf_text.h"
-#include "render/gltf/gltf_references.h"
+#include "render/gltf/check/gltf_files.h"
 #include "render/scene/accelerator.h"
 #include "variolux/base/error.h"
 #include "variolux/base/image_io.h"
@@ -642,7 +642,9 @@ TEST(BadScene, NumbersThatAreNone) {
 TEST(BadScene, NothingToSeeOrSeeBy) {
     expectFailure("no light", [](GltfText& g) { g.json["scenes"][0]["nodes"] = {0, 1}; });
     expectFailure("no triangles", [](GltfText& g) { g.json["scenes"][0]["nodes"] = {1, 2}; });
-    expectFailure("more than one parent", [](GltfText& g) { g.json["nodes"][0]["children"] = {0}; });
+    expectFailure("node 0 'square' is below itself: it is a child of its own",
+                  [](GltfText& g) { g.json["nodes"][0]["children"] = {0}; });
+    expectFailure("more than one parent", [](GltfText& g) { g.json["nodes"][1]["children"] = {0}; });
     expectFailure("KHR_texture_basisu",
                   [](GltfText& g) { g.json["extensionsRequired"] = {"KHR_texture_basisu"}; });
 }

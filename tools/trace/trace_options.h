@@ -41,6 +41,7 @@ struct TraceOptions {
     std::string frames;
     double framesPerSecond = 24;
     std::optional<int> frame;  // of --frames, the one at work
+    bool tellsView = true;     // what camera is made: once in a sequence
     bool overwrite = false;
     RenderOptions render;
     const CLI::App* commandLine = nullptr;

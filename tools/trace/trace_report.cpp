@@ -19,7 +19,9 @@ int printCameras(const TraceOptions& o, const Scene& loaded) {
     if (!loaded.cameraFault.empty())
         note(o, loaded.cameraFault +
                     ": one is made that has the whole scene in its picture, from 45 degrees to the right of "
-                    "the front (+z) and 22.5 up (--camera-position, --look-at and --fov place another)");
+                    "the front (+z) and 22.5 up (rendering and --explain tell its --camera-position, "
+                    "--look-at and "
+                    "--fov)");
     for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
         const Camera& c = loaded.cameras[i];
         std::cout << i << "  " << c.name
@@ -72,6 +74,29 @@ int printSkipped(const TraceOptions& o) {
         std::cout << nlohmann::ordered_json{{"scene", o.scene}, {"dump", o.dump}, {"skipped", true}}.dump(2)
                   << "\n";
     return kDone;
+}
+
+void warnOfBacks(const TraceOptions& o, const Scene& loaded, const Accelerator& accelerator) {
+    constexpr int kAcross = 32;
+    const View view(loaded.cameras[o.render.camera], o.render.width, o.render.height);
+    int met = 0, hidden = 0;
+    for (int y = 0; y < kAcross; ++y)
+        for (int x = 0; x < kAcross; ++x) {
+            const Ray ray =
+                view.ray((static_cast<float>(x) + 0.5f) / kAcross * static_cast<float>(o.render.width),
+                         (static_cast<float>(y) + 0.5f) / kAcross * static_cast<float>(o.render.height),
+                         {0.5f, 0.5f}, 0.5f);
+            const auto first = accelerator.intersectBothSides(ray, 0);
+            if (!first) continue;
+            ++met;
+            const auto seen = accelerator.intersect(ray, 0);
+            hidden += !seen || seen->distance > first->distance;
+        }
+    if (2 * hidden <= met) return;
+    note(o, "warning: " + std::to_string(100 * hidden / met) +
+                " % of what is in the picture shows its back, and is not seen: the surfaces have one side. "
+                "Where that "
+                "is not meant, turn their triangles round, or set their materials' doubleSided");
 }
 
 void warnOfBrightness(const TraceOptions& o, const Scene& loaded, const RenderReport& report) {

@@ -16,6 +16,10 @@ int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, cons
 /// That the work was finished before.
 int printSkipped(const TraceOptions& o);
 
+/// Says so when most of what the camera would see first are the backs of surfaces that have one side, which
+/// are not seen: the usual reason why a file shows holes or nothing.
+void warnOfBacks(const TraceOptions& o, const Scene& loaded, const Accelerator& accelerator);
+
 /// Warns when the picture is far brighter or darker than screens show.
 void warnOfBrightness(const TraceOptions& o, const Scene& loaded, const RenderReport& report);
 

@@ -65,8 +65,9 @@ std::pair<Vec3, Vec3> boxOf(const TraceOptions& o, const Scene& loaded, const Sh
                     (loaded.cameraFault.empty() ? "" : loaded.cameraFault + "; and it ") +
                         "has no triangles to place a camera by: give --camera-position and --look-at");
     if (!o.frame) return {loaded.boundsMin, loaded.boundsMax};
-    const Scene start = loadScene(o.scene, o.environment, first, {o.lightUnits, o.variant});
-    return {start.boundsMin, start.boundsMax};
+    const Shutter all{first.open, std::max(first.close, loaded.lastKey)};
+    const Scene course = loadScene(o.scene, o.environment, all, {o.lightUnits, o.variant});
+    return {course.boundsMin, course.boundsMax};
 }
 
 }  // namespace
@@ -116,7 +117,7 @@ void placeCamera(const TraceOptions& o, Scene& loaded, const Shutter& first) {
         camera.course.reset();
         camera.toWorld = lookingAt(view.position, view.target);
     }
-    if (made)
+    if (made && o.tellsView && !(placed && turned && o.verticalDegrees > 0))
         note(o, loaded.cameraFault + ": one is made, --camera-position " + textOf(view.position) +
                     " --look-at " + textOf(view.target) + " --fov " + textOf(view.verticalDegrees));
 }

@@ -9,8 +9,8 @@ namespace vlx::render {
 void chooseView(TraceOptions& o, Scene known);
 
 /// Puts the chosen camera where the command line wants it; makes it where there is none. A camera that is to
-/// stand still is placed by what the scene holds in the exposure `first`, frame 0's of a sequence: it is in
-/// all frames the same.
+/// stand still is placed by what the scene holds while it is exposed, or in a sequence from the exposure
+/// `first`, frame 0's, to the last key of its animations: it is in all frames the same.
 void placeCamera(const TraceOptions& o, Scene& loaded, const Shutter& first);
 
 /// The picture of the dump that is added to, where the command line names none.

@@ -102,6 +102,7 @@ void Animations::readChannel(std::size_t animation, std::size_t index) {
         if (!std::isfinite(out.times[i]) || (i > 0 && !(out.times[i] > out.times[i - 1])))
             file_.fail(what + ": times must be finite and ascend, key " + std::to_string(i) + " is at " +
                        std::to_string(out.times[i]));
+    lastKey_ = std::max(lastKey_, out.times.back());
     const std::size_t wanted = out.times.size() * width * (out.interpolation == Interpolation::Cubic ? 3 : 1);
     if (out.values.size() != wanted)
         file_.fail(what + " has " + std::to_string(out.values.size() / (morphs ? 1 : width)) +

@@ -43,6 +43,9 @@ class Animations {
     /// The weights of its mesh's targets, where an animation gives them.
     std::optional<std::vector<double>> weights(std::size_t node, double seconds) const;
 
+    /// When the last of them is over, seconds; at least 0.
+    double lastKey() const { return lastKey_; }
+
   private:
     enum class Property { Translation, Rotation, Scale, Weights };
     enum class Interpolation { Linear, Step, Cubic };
@@ -70,6 +73,7 @@ class Animations {
     std::vector<std::string>& warnings_;
     std::map<std::size_t, Animated> nodes_;
     std::map<std::size_t, Morphed> morphed_;
+    double lastKey_ = 0;
 };
 
 }  // namespace vlx::render

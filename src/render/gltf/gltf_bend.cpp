@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "variolux/base/text.h"
+
 namespace vlx::render {
 namespace {
 
@@ -177,11 +179,19 @@ void PrimitiveVertices::readInfluences(const tinygltf::Primitive& primitive, std
         const auto each = std::span(influences_).subspan(v * influencesEach_, influencesEach_);
         float sum = 0;
         for (const Influence& i : each) sum += i.weight;
+        if (std::abs(sum - 1) > 0.02f && scaled_++ == 0) firstScaled_ = {v, sum};  // bytes round
         if (!(sum > 0 && std::isfinite(sum)))
             file_.fail(what_ + ": the weights of vertex " + std::to_string(v) + " add up to " +
                        std::to_string(sum) + ", expected 1");
         for (Influence& i : each) i.weight /= sum;
     }
+}
+
+std::string PrimitiveVertices::doubt() const {
+    if (scaled_ == 0) return {};
+    return "the weights of " + std::to_string(scaled_) + " of its " + std::to_string(count()) +
+           " vertices do not add up to 1 (those of vertex " + std::to_string(firstScaled_.first) + " to " +
+           formatted("%.3g", static_cast<double>(firstScaled_.second)) + "): they are scaled to it";
 }
 
 /// Linear blend skinning: the mean of the joints' transforms.

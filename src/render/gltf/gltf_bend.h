@@ -60,6 +60,8 @@ class PrimitiveVertices {
 
     std::size_t count() const { return positions_.size(); }
     bool skinned() const { return !influences_.empty(); }
+    /// What was mended of the weights, or nothing.
+    std::string doubt() const;
     /// Throws Error where a vertex gets where it is not finite.
     VertexBlock at(const Bend& bend) const;
 
@@ -84,6 +86,8 @@ class PrimitiveVertices {
     std::vector<Target> targets_;
     std::vector<Influence> influences_;  ///< influencesEach_ a vertex, the weights of each adding up to 1
     std::size_t influencesEach_ = 0;
+    std::size_t scaled_ = 0;                             ///< vertices whose weights did not add up to 1
+    std::pair<std::size_t, float> firstScaled_{0, 1.f};  ///< the first of them, and their sum
 };
 
 }  // namespace vlx::render

@@ -6,9 +6,8 @@
 #include <iterator>
 #include <limits>
 
-#include "render/gltf/gltf_check.h"
+#include "render/gltf/check/gltf_files.h"
 #include "render/gltf/gltf_compressed.h"
-#include "render/gltf/gltf_references.h"
 #include "variolux/base/error.h"
 
 namespace vlx::render {
@@ -16,8 +15,9 @@ namespace {
 
 std::vector<unsigned char> readBytes(const std::string& path) {
     std::error_code ignored;
-    if (!std::filesystem::is_regular_file(path, ignored))
-        throw Error(path, "expected a glTF file, found no such file");
+    const std::filesystem::file_status status = std::filesystem::status(path, ignored);
+    if (!std::filesystem::is_regular_file(status))
+        throw Error(path, "expected a glTF file, found " + kindOf(status));
     std::ifstream in(path, std::ios::binary);
     if (!in) throw Error(path, "cannot be opened");
     std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
@@ -42,6 +42,9 @@ void checkChunks(const std::string& path, const std::vector<unsigned char>& byte
     const std::size_t size = bytes.size();
     if (size < 20)
         throw Error(path, "truncated: a binary glTF header has 20 bytes, found " + std::to_string(size));
+    if (word(bytes, 4) != 2)
+        throw Error(path, "expected binary glTF 2, found version " + std::to_string(word(bytes, 4)) +
+                              "; turn it into 2, for example with `gltf-pipeline -i IN -o OUT`");
     const std::size_t length = word(bytes, 8);
     if (length > size)
         throw Error(path, "truncated: the header says " + std::to_string(length) + " bytes, the file has " +
@@ -125,7 +128,7 @@ GltfFile::GltfFile(const std::string& path, Use use) : path_(path) {
     if (binary) checkChunks(path, bytes);
     const std::string json(reinterpret_cast<const char*>(bytes.data()) + (binary ? 20 : 0),
                            binary ? word(bytes, 12) : bytes.size());
-    zeroAspects_ = checkGltf(path, json);
+    facts_ = checkGltf(path, json);
     if (std::string plain = withCompressedViews(json); plain != json)
         bytes = withJson(bytes, std::move(plain));
     tinygltf::TinyGLTF loader;

@@ -9,12 +9,17 @@
 #include <string_view>
 #include <vector>
 
+#include "render/gltf/check/gltf_check.h"
 #include "render/scene/texture.h"
 
 namespace vlx::render {
 
-/// A parsed glTF file. Its JSON is checked first (gltf_check.h), the bytes that references lead to when they
-/// are followed: tinygltf does neither.
+/// From the origin along an axis, metres: a triangle's squared area is a float still.
+inline constexpr float kFarthest = 1e9f;
+inline constexpr const char* kFarthestText = "1e9 m";
+
+/// A parsed glTF file. Its JSON is checked first (check/gltf_check.h), the bytes that references lead to when
+/// they are followed: tinygltf does neither.
 class GltfFile {
   public:
     /// What is wanted of a file; the rest is not read, and may be broken.
@@ -27,7 +32,9 @@ class GltfFile {
     const std::string& path() const { return path_; }
     const tinygltf::Model& model() const { return model_; }
     /// Whether a camera's aspectRatio is 0, not just missing.
-    bool zeroAspect(std::size_t camera) const { return zeroAspects_[camera]; }
+    bool zeroAspect(std::size_t camera) const { return facts_.zeroAspects[camera]; }
+    /// Of values that are taken as others.
+    const std::vector<std::string>& warnings() const { return facts_.warnings; }
 
     [[noreturn]] void fail(const std::string& message) const;
 
@@ -56,7 +63,7 @@ class GltfFile {
     void decodeDraco(tinygltf::Primitive& primitive, const std::string& what);
 
     std::string path_;
-    std::vector<bool> zeroAspects_;
+    GltfFacts facts_;
     tinygltf::Model model_;
 };
 

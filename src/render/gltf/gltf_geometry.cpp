@@ -188,6 +188,8 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Us
     const std::size_t count = vertices.count();
     if (use.joints > 0 && !vertices.skinned())
         scene_.report.warnings.push_back(what + " has no JOINTS_0: it stays where its node is");
+    if (const std::string doubt = vertices.doubt(); !doubt.empty())
+        scene_.report.warnings.push_back(what + ": " + doubt);
     Deformation deformation;
     deformation.cause = use.cause;
     const std::vector<VertexBlock> blocks = blocksOf(vertices, use, deformation);

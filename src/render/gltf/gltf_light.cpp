@@ -88,6 +88,8 @@ std::optional<Light> LightReader::read(int index, const tinygltf::Node& node, co
         return std::nullopt;
     }
     light.position = toWorld.point({0, 0, 0});
+    if (!(maxComponent(absolute(light.position)) <= kFarthest))
+        file_.fail(what + ": the light is more than " + kFarthestText + " from the origin");
     const Vec3 axis = toWorld.vector({0, 0, -1});
     const bool directed = source.type != "point";
     if (directed && !(length(axis) > 0)) file_.fail(what + ": the light has no direction");

@@ -11,6 +11,11 @@ constexpr double kMostIor = 1000;
 
 float unit(double v) { return static_cast<float>(std::clamp(std::isnan(v) ? 0.0 : v, 0.0, 1.0)); }
 
+/// Three numbers in [0, 1].
+Rgb unitColour(const std::vector<double>& v) {
+    return v.size() < 3 ? Rgb(1) : Rgb{unit(v[0]), unit(v[1]), unit(v[2])};
+}
+
 /// Three numbers >= 0.
 Rgb colour(const std::vector<double>& v, const Rgb& fallback) {
     if (v.size() < 3) return fallback;
@@ -143,9 +148,9 @@ void MaterialReader::readUnlit(Material& m) const {
 void MaterialReader::readGlossiness(Material& m, const tinygltf::Value& source, const std::string& what) {
     constexpr float kReflected = 0.04f;  // at index 1.5
     const std::vector<double> diffuse = numbers(source, "diffuseFactor");
-    const Rgb reflected = colour(numbers(source, "specularFactor"), {1, 1, 1});
+    const Rgb reflected = unitColour(numbers(source, "specularFactor"));
     const float glossiness = unit(number(source, "glossinessFactor", 1));
-    m.baseColour = colour(diffuse, {1, 1, 1});
+    m.baseColour = unitColour(diffuse);
     m.opacity = diffuse.size() == 4 ? unit(diffuse[3]) : 1;
     m.baseColourTexture = texture(source, "diffuseTexture", ColourSpace::Srgb, what);
     m.metallic = 0;
@@ -185,7 +190,7 @@ Material MaterialReader::read(const tinygltf::Material& source, std::size_t inde
     furtherUvSets_.clear();
     Material m;
     m.name = source.name;
-    m.baseColour = colour(pbr.baseColorFactor, {1, 1, 1});
+    m.baseColour = unitColour(pbr.baseColorFactor);
     if (pbr.baseColorFactor.size() == 4) m.opacity = unit(pbr.baseColorFactor[3]);
     m.baseColourTexture = plain(pbr.baseColorTexture, Srgb, "baseColorTexture");
     m.doubleSided = source.doubleSided;

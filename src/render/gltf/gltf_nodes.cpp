@@ -49,11 +49,8 @@ Transform NodeTree::atRest(std::size_t node) const {
 }
 
 std::string NodeTree::movesBy(std::size_t node) const {
-    for (auto n = static_cast<std::int64_t>(node); n >= 0; n = parents_[static_cast<std::size_t>(n)]) {
-        std::string cause = animations_.causeOf(static_cast<std::size_t>(n));
-        if (!cause.empty()) return cause;
-    }
-    return {};
+    const std::int64_t mover = movers_[node];
+    return mover < 0 ? std::string() : animations_.causeOf(static_cast<std::size_t>(mover));
 }
 
 Transform NodeTree::placeAt(std::size_t node, double seconds) const {
@@ -88,6 +85,15 @@ std::optional<Course> NodeTree::courseOf(std::size_t node, const Motion& own) co
     return elsewhere ? std::optional(course) : std::nullopt;
 }
 
+std::string NodeTree::faultOfParents(std::size_t node, std::int64_t parent) const {
+    const auto name = [&](std::size_t n) { return described("node", n, file_.model().nodes[n].name); };
+    for (std::int64_t n = parent; n >= 0; n = parents_[static_cast<std::size_t>(n)])
+        if (static_cast<std::size_t>(n) == node)
+            return name(node) + " is below itself: it is a child of " +
+                   (parent == n ? "its own" : name(static_cast<std::size_t>(parent)));
+    return name(node) + " has more than one parent";
+}
+
 std::vector<PlacedNode> NodeTree::placed() {
     const tinygltf::Model& model = file_.model();
     const tinygltf::Scene* const shown = scene();
@@ -100,6 +106,7 @@ std::vector<PlacedNode> NodeTree::placed() {
     std::vector<Pending> stack;
     std::vector<char> visited(model.nodes.size(), 0);
     parents_.assign(model.nodes.size(), -2);
+    movers_.assign(model.nodes.size(), -1);
     std::vector<PlacedNode> placed;
     for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}, -1});
     while (!stack.empty()) {
@@ -110,8 +117,13 @@ std::vector<PlacedNode> NodeTree::placed() {
                        std::to_string(model.nodes.size()));
         const auto index = static_cast<std::size_t>(next.node);
         const tinygltf::Node& node = model.nodes[index];
-        if (visited[index]++) file_.fail(described("node", index, node.name) + " has more than one parent");
+        if (visited[index]++) file_.fail(faultOfParents(index, next.parentNode));
         parents_[index] = next.parentNode;
+        // Known of the parent: chains may be long.
+        if (!animations_.causeOf(index).empty())
+            movers_[index] = next.node;
+        else if (next.parentNode >= 0)
+            movers_[index] = movers_[static_cast<std::size_t>(next.parentNode)];
         PlacedNode& at = placed.emplace_back();
         at.node = index;
         if (movesBy(index).empty()) {

@@ -40,6 +40,7 @@ class NodeTree {
 
   private:
     Transform atRest(std::size_t node) const;
+    std::string faultOfParents(std::size_t node, std::int64_t parent) const;
     Motion motionOf(std::size_t node, double later) const;
     std::optional<Course> courseOf(std::size_t node, const Motion& own) const;
 
@@ -47,6 +48,7 @@ class NodeTree {
     Shutter shutter_;
     Animations animations_;
     std::vector<std::int64_t> parents_;  ///< of each node; -1: a root; -2: not in the scene
+    std::vector<std::int64_t> movers_;   ///< the nearest that is animated, itself or above; -1: none
 };
 
 }  // namespace vlx::render

@@ -160,6 +160,16 @@ class Analysis {
         return list;
     }
 
+    /// Whether a path can meet what does not show without light.
+    bool needsLight() const {
+        bool unlit = false;
+        for (std::size_t m = 0; m < met_.size(); ++m) {
+            if (met_[m] && !scene_.materials[m].unlit) return true;
+            unlit = unlit || met_[m];
+        }
+        return !unlit;
+    }
+
   private:
     const Deformation* deformationOf(std::size_t shape) const {
         const std::int32_t d = scene_.shapes[shape].deformation;
@@ -380,11 +390,14 @@ Plan planEffects(const Scene& scene, const PlanOptions& options) {
         plan.warnings.push_back("the image is biased: " + std::string(nameOf(effect)) +
                                 " left out, although " + finding.reason);
     }
-    if (std::ranges::none_of(kLightEffects, [&](Effect e) { return plan.called.has(e); })) {
+    if (analysis.needsLight() &&
+        std::ranges::none_of(kLightEffects, [&](Effect e) { return plan.called.has(e); })) {
         const auto idle = analysis.idleLights();
-        plan.warnings.push_back("no light reaches anything, and the picture is black" +
-                                (idle.empty() ? "" : " (" + analysis.whyIdle(idle.front()) + ")") +
-                                ": --env-constant 1,1,1 or --env IMAGE lights it from all around");
+        plan.warnings.push_back(
+            "no light reaches anything, and " +
+            std::string(plan.called.has(Effect::Unlit) ? "all that is not unlit" : "the picture") +
+            " is black" + (idle.empty() ? "" : " (" + analysis.whyIdle(idle.front()) + ")") +
+            ": --env-constant 1,1,1 or --env IMAGE lights it from all around");
     }
     plan.motion = analysis.motion();
     if (plan.general) return plan;

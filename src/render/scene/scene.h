@@ -124,6 +124,7 @@ struct Scene {
     Environment environment;
     Shutter shutter;             ///< during which motions were followed
     std::size_t animations = 0;  ///< in the file, whether they move anything or not
+    double lastKey = 0;          ///< when the last of them is over, seconds
 
     Vec3 boundsMin{0, 0, 0};
     Vec3 boundsMax{0, 0, 0};

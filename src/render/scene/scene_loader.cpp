@@ -13,6 +13,7 @@
 #include "render/gltf/gltf_nodes.h"
 #include "render/gltf/gltf_variants.h"
 #include "variolux/base/error.h"
+#include "variolux/base/text.h"
 
 namespace vlx::render {
 namespace {
@@ -41,15 +42,24 @@ class Loader {
     Scene load(const EnvironmentOptions& environment, const SceneChoices& choices) {
         if (!choices.variant.empty()) geometry_.setVariant(variantNamed(file_, choices.variant));
         checkExtensions();
+        scene_.report.warnings.insert(scene_.report.warnings.end(), file_.warnings().begin(),
+                                      file_.warnings().end());
         readMaterials();
         const std::vector<PlacedNode> placed = nodes_.placed();
         if (model_.scenes.empty()) file_.fail("has no scene");
         readCameras(placed);
+        scene_.lastKey = nodes_.animations().lastKey();
         readNodes(placed, choices.lightUnits);
         readEnvironment(environment);
         if (scene_.shapes.empty() && !scene_.environment)
             file_.fail("has no triangles and no environment (give one with --env-constant or --env)");
         completeScene(scene_);
+        const float reach =
+            std::max(maxComponent(absolute(scene_.boundsMin)), maxComponent(absolute(scene_.boundsMax)));
+        if (!(reach <= kFarthest))
+            file_.fail("reaches " + formatted("%.3g", static_cast<double>(reach)) +
+                       " m from the origin, expected at most " + kFarthestText +
+                       ": see the scales and translations of its nodes");
         const bool glows = std::ranges::any_of(
             scene_.shapes, [&](const Shape& shape) { return scene_.materials[shape.material].emissive(); });
         if (scene_.lights.empty() && !glows)

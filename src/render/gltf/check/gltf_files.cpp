@@ -1,6 +1,7 @@
-#include "render/gltf/gltf_references.h"
+#include "render/gltf/check/gltf_files.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstdint>
 #include <cstring>
@@ -10,6 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+
+#include "variolux/base/error.h"
 
 namespace vlx::render {
 namespace {
@@ -137,6 +140,44 @@ std::vector<std::string> gltfFiles(const std::string& path) {
         }
     }
     return files;
+}
+
+std::string kindOf(const std::filesystem::file_status& status) {
+    switch (status.type()) {
+        case std::filesystem::file_type::none:
+        case std::filesystem::file_type::not_found:
+            return "no such file";
+        case std::filesystem::file_type::regular:
+            return "a file";
+        case std::filesystem::file_type::directory:
+            return "a folder";
+        default:
+            return "a pipe or device";
+    }
+}
+
+void checkGltfFiles(const std::string& path, const nlohmann::json& root) {
+    const auto buffers = root.find("buffers");
+    if (buffers == root.end()) return;
+    for (std::size_t i = 0; i < buffers->size(); ++i) {
+        const auto uri = (*buffers)[i].find("uri");
+        if (uri == (*buffers)[i].end()) continue;
+        const auto text = uri->get<std::string>();
+        const std::string where = "buffers[" + std::to_string(i) + "].uri";
+        if (text.starts_with("data:")) {
+            constexpr std::array kinds{"data:application/octet-stream;base64,",
+                                       "data:application/gltf-buffer;base64,", "data:text/plain;base64,"};
+            if (std::ranges::none_of(kinds, [&](const char* kind) { return text.starts_with(kind); }))
+                throw Error(path, where + ": expected data:application/octet-stream;base64, found " +
+                                      text.substr(0, std::min<std::size_t>(text.find(','), 60)));
+            continue;
+        }
+        std::error_code ignored;
+        const std::filesystem::path file = std::filesystem::path(path).parent_path() / decoded(text);
+        const std::filesystem::file_status status = std::filesystem::status(file, ignored);
+        if (!std::filesystem::is_regular_file(status))
+            throw Error(path, where + ": expected a file beside it, '" + text + "', found " + kindOf(status));
+    }
 }
 
 }  // namespace vlx::render

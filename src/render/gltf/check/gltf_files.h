@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -16,5 +18,12 @@ std::string gltfJson(const std::string& path);
 /// Of the JSON of a glTF file, what its cameras need: scenes, nodes with their places, cameras, and where
 /// animations move cameras, these with the buffers. Empty if the text is no JSON object.
 std::string camerasAlone(const std::string& json);
+
+/// Checks the uris of a glTF file's buffers: a file that is there, or data in base64 of a kind that is read.
+/// Throws Error.
+void checkGltfFiles(const std::string& path, const nlohmann::json& root);
+
+/// "no such file", "a folder", "a file that is none of data": what stands in a regular file's place.
+std::string kindOf(const std::filesystem::file_status& status);
 
 }  // namespace vlx::render
