@@ -51,7 +51,7 @@ class BidirectionalTracer::EyeEstimate {
 
     const Rgb& radiance() const { return radiance_; }
 
-    void meet(const GeneralWalk& walk, const MetLight& met) {
+    void meet(const Walk& walk, const MetLight& met) {
         if (walk.bounces == 0) {
             add(walk, {met.radiance, 1});
             return;
@@ -70,7 +70,8 @@ class BidirectionalTracer::EyeEstimate {
         add(walk, {met.radiance * w, spreadOf(w, 1 + byDirect)});
     }
 
-    void gather(const GeneralWalk& walk, const EyeVertex& eye, const BouncePairs& pairs, std::uint32_t seed) {
+    template <Features F>
+    void gather(const Walk& walk, const EyeVertex& eye, const BouncePairs& pairs, std::uint32_t seed) {
         const bool parallel = walk.bounces == 0 && tracer_.view().parallel();  // the camera ray's density
         sums_.arrive(parallel ? 1 : walk.way * walk.way, eye.cosine(eye.back));
         lightsSampled_ = eye.side.bsdf.hasSmoothLobe() && !in_.lights.empty();
@@ -95,7 +96,7 @@ class BidirectionalTracer::EyeEstimate {
     }
 
   private:
-    void add(const GeneralWalk& walk, const Found& found) {
+    void add(const Walk& walk, const Found& found) {
         const Rgb v = walk.throughput * found.radiance;
         radiance_ += v;
         if (pathSquares_ != nullptr) *pathSquares_ += v * v * found.spread;
@@ -205,7 +206,9 @@ PathSample BidirectionalTracer::traceRay(const Ray& start, Vec2 lens, const Path
     const float density = view().project(start.origin + start.direction, lens, start.time).density;
     EyeEstimate estimate(*this, light, mis(static_cast<double>(window_.pixels()) / density), raySeed,
                          pathSquares);
-    PathSample sample = eyeSubpath<kEveryFeature>(context_, start, sampler, estimate);
+    PathSample sample = eyeSubpath(context_, start, sampler, estimate, [&](EyePath& path, const Hit& hit) {
+        return scatterAt<kEveryFeature>(path, hit, sampler, estimate);
+    });
     sample.radiance = estimate.radiance();
     return sample;
 }

@@ -13,9 +13,6 @@
 /// Vertices of the bidirectional tracer's subpaths, and the quantities of MIS that they carry.
 namespace vlx::render {
 
-/// Of the general kernel.
-using GeneralWalk = Walk<kEveryFeature>;
-
 inline double mis(double density) { return density * density; }
 
 /// What MIS has to know of a subpath.

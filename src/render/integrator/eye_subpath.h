@@ -37,80 +37,93 @@ inline MetLight surfaceMet(const PathContext& in, const Hit& hit, const SurfaceP
 /// A bounce's random numbers: by dimension::kDirection to kLightChoice.
 using BouncePairs = std::array<Vec2, dimension::kPerBounce>;
 
-/// Follows a camera ray from surface to surface. Returns what is seen, without its radiance: that is for
-/// `Estimator`, which is told what the walk comes by:
-/// - meet(const Walk<F>&, const MetLight&): light, where the walk is;
-/// - gather(const Walk<F>&, const PathVertex<F>&, const BouncePairs&, std::uint32_t seed): a vertex; `seed`
+/// A camera ray's path on its way, and what is seen so far, without its radiance.
+struct EyePath {
+    Walk walk;
+    std::uint32_t seed = 0;  ///< of opacity; every ray of the path has one of its own
+    PathSample seen;
+    bool featuresPending = true;
+    bool mirrored = true;  ///< nothing but mirrors and clear glass so far
+
+    std::uint32_t raySeed() const { return seed + 2 * static_cast<std::uint32_t>(walk.bounces); }
+};
+
+/// What happens where the path has met a surface that calls for the features `F` at most. Returns whether it
+/// goes on. `Estimator` gathers the radiance; it is told what the walk comes by:
+/// - meet(const Walk&, const MetLight&): light, where the walk is;
+/// - gather<F>(const Walk&, const PathVertex<F>&, const BouncePairs&, std::uint32_t seed): a vertex; `seed`
 ///   is of the opacity that a shadow ray meets;
 /// - scatter(const PathVertex<F>&, const BsdfSample&, const Vec3& direction): how the walk goes on from it.
 template <Features F, class Estimator>
-PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler& sampler,
-                      Estimator& estimator) {
-    PathSample result;
-    Walk<F> walk{in, start};
-    bool featuresPending = true;
-    bool mirrored = true;  // nothing but mirrors and clear glass so far
-    const std::uint32_t seed = in.hashesOpacity ? sampler.hashSeed(dimension::kOpacity) : 0;
+bool scatterAt(EyePath& path, const Hit& hit, const PathSampler& sampler, Estimator& estimator) {
+    Walk& walk = path.walk;
+    const PathContext& in = walk.in;
+    const SurfacePoint point = walk.arrive<F>(hit);
+    const bool emits = point.material->emissive() && (path.mirrored || !point.material->unlit) &&
+                       (!point.fromBehind || point.material->visibleFromBehind());
+    Rgb shown(1);  // what shines is white among the features
+    if (emits) {
+        const MetLight met = surfaceMet(in, hit, point, walk.ray.direction);
+        estimator.meet(walk, met);
+        if (point.material->unlit) shown = met.radiance;
+    }
+    if (!path.featuresPending && walk.bounces >= in.options.maxBounces) return false;
 
+    const PathVertex<F> vertex(walk, point);
+    const BasicBsdf<F>& bsdf = vertex.side.bsdf;
+    if (path.featuresPending && (bsdf.hasSmoothLobe() || emits)) {
+        path.featuresPending = false;
+        path.seen.normal = point.shadingNormal;
+        path.seen.albedo = emits ? shown : bsdf.albedo();
+    }
+    if (walk.bounces >= in.options.maxBounces) return false;
+    if (walk.bounces > 0) countEffect(Effect::Indirect);
+
+    // The bounce's four pairs at once: two of them one by one would take longer.
+    const BouncePairs pairs = sampler.bounce(walk.bounces);
+    estimator.template gather<F>(walk, vertex, pairs, path.raySeed() + 1);
+
+    const Vec2 choice = pairs[dimension::kChoice];
+    const BsdfSample next = bsdf.sample(pairs[dimension::kDirection], choice.x);
+    if (isBlack(next.weight)) return false;
+    const Vec3 direction = normalized(vertex.side.frame.toWorld(next.wi));
+    estimator.scatter(vertex, next, direction);
+    path.mirrored = path.mirrored && next.delta;
+    walk.throughput *= next.weight;
+    const float survival = std::min(1.f, maxComponent(walk.throughput));
+    return walk.goOn(vertex, next, direction, survival, choice.y);
+}
+
+/// Follows a camera ray from surface to surface: at each, scatter(EyePath&, const Hit&) is scatterAt with the
+/// features that the surface calls for. Returns what is seen, without its radiance.
+template <class Estimator, class Scatter>
+PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler& sampler,
+                      Estimator& estimator, const Scatter& scatter) {
+    EyePath path{{in, start}, in.hashesOpacity ? sampler.hashSeed(dimension::kOpacity) : 0, {}};
+    const Walk& walk = path.walk;
     for (;;) {
-        // Stochastic opacity: a seed of its own for every ray of the path.
-        const std::uint32_t raySeed = seed + 2 * static_cast<std::uint32_t>(walk.bounces);
         const Ray& ray = walk.ray;
-        const std::optional<Hit> hit = in.accelerator.intersect(ray, raySeed);
-        if (walk.bounces == 0 && in.options.motion != nullptr) result.moved = in.options.motion->of(ray, hit);
+        const std::optional<Hit> hit = in.accelerator.intersect(ray, path.raySeed());
+        if (walk.bounces == 0) {
+            if (in.options.motion != nullptr) path.seen.moved = in.options.motion->of(ray, hit);
+            path.seen.hit = hit.has_value();
+            path.seen.depth = hit ? hit->distance : 0;
+        }
         if (!hit) {
             if (in.scene.environment) estimator.meet(walk, environmentMet(in, ray.direction));
             break;
         }
-        if (walk.bounces == 0) {
-            result.hit = true;
-            result.depth = hit->distance;
-        }
         if (hit->light >= 0) {
-            walk.travel(hit->distance);
+            path.walk.travel(hit->distance);
             const Vec3 outwards = ray.origin + ray.direction * hit->distance -
                                   in.scene.lights[static_cast<std::size_t>(hit->light)].position;
             estimator.meet(walk, sphereMet(in, *hit, ray, outwards));
-            if (featuresPending) result.normal = normalized(outwards);
+            if (path.featuresPending) path.seen.normal = normalized(outwards);
             break;
         }
-
-        const SurfacePoint point = walk.arrive(*hit);
-        const bool emits = point.material->emissive() && (mirrored || !point.material->unlit) &&
-                           (!point.fromBehind || point.material->visibleFromBehind());
-        Rgb shown(1);  // what shines is white among the features
-        if (emits) {
-            const MetLight met = surfaceMet(in, *hit, point, ray.direction);
-            estimator.meet(walk, met);
-            if (point.material->unlit) shown = met.radiance;
-        }
-        if (!featuresPending && walk.bounces >= in.options.maxBounces) break;
-
-        const PathVertex<F> vertex(walk, point);
-        const BasicBsdf<F>& bsdf = vertex.side.bsdf;
-        if (featuresPending && (bsdf.hasSmoothLobe() || emits)) {
-            featuresPending = false;
-            result.normal = point.shadingNormal;
-            result.albedo = emits ? shown : bsdf.albedo();
-        }
-        if (walk.bounces >= in.options.maxBounces) break;
-        if (walk.bounces > 0) countEffect(Effect::Indirect);
-
-        // The bounce's four pairs at once: two of them one by one would take longer.
-        const BouncePairs pairs = sampler.bounce(walk.bounces);
-        estimator.gather(walk, vertex, pairs, raySeed + 1);
-
-        const Vec2 choice = pairs[dimension::kChoice];
-        const BsdfSample next = bsdf.sample(pairs[dimension::kDirection], choice.x);
-        if (isBlack(next.weight)) break;
-        const Vec3 direction = normalized(vertex.side.frame.toWorld(next.wi));
-        estimator.scatter(vertex, next, direction);
-        mirrored = mirrored && next.delta;
-        walk.throughput *= next.weight;
-        const float survival = std::min(1.f, maxComponent(walk.throughput));
-        if (!walk.goOn(vertex, next, direction, survival, choice.y)) break;
+        if (!scatter(path, *hit)) break;
     }
-    return result;
+    return path.seen;
 }
 
 }  // namespace vlx::render

@@ -2,7 +2,7 @@
 
 namespace vlx::render {
 
-template PathSample tracePath<kLayeredTextured>(const PathContext&, const Ray&, const PathSampler&);
-template PathSample tracePath<kEveryFeature>(const PathContext&, const Ray&, const PathSampler&);
+template bool scatterAt<kLayeredTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+template bool scatterAt<kEveryFeature>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
 
 }  // namespace vlx::render

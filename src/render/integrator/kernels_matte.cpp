@@ -2,8 +2,8 @@
 
 namespace vlx::render {
 
-template PathSample tracePath<kMatte>(const PathContext&, const Ray&, const PathSampler&);
-template PathSample tracePath<kMatteTextured>(const PathContext&, const Ray&, const PathSampler&);
-template PathSample tracePath<kReflecting>(const PathContext&, const Ray&, const PathSampler&);
+template bool scatterAt<kMatte>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+template bool scatterAt<kMatteTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+template bool scatterAt<kReflecting>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
 
 }  // namespace vlx::render

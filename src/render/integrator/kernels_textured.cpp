@@ -2,7 +2,7 @@
 
 namespace vlx::render {
 
-template PathSample tracePath<kReflectingTextured>(const PathContext&, const Ray&, const PathSampler&);
-template PathSample tracePath<kLayered>(const PathContext&, const Ray&, const PathSampler&);
+template bool scatterAt<kReflectingTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+template bool scatterAt<kLayered>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
 
 }  // namespace vlx::render

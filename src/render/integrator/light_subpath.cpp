@@ -70,14 +70,14 @@ std::vector<BidirectionalTracer::LightVertex> BidirectionalTracer::lightSubpath(
     const Light& light = context_.scene.lights[start.light];
     const std::uint32_t seed = sampler.hashSeed(dimension::kLightOpacity);
     std::uint32_t rays = 0;
-    GeneralWalk walk{context_, start.ray, start.throughput};
+    Walk walk{context_, start.ray, start.throughput};
     MisSums sums;
     path.reserve(6);
 
     for (;;) {
         const std::optional<Hit> hit = context_.accelerator.intersectBothSides(walk.ray, seed + rays++);
         if (!hit || hit->light >= 0) break;
-        const SurfacePoint point = walk.arrive(*hit);
+        const SurfacePoint point = walk.arrive<kEveryFeature>(*hit);
         if (!point.material->visibleFromBehind()) {
             // Seen from behind by light, from the front by the camera's rays, and the other way round.
             if (point.fromBehind) break;

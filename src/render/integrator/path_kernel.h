@@ -2,7 +2,8 @@
 
 #include "render/integrator/eye_subpath.h"
 
-/// The path tracer, compiled for what a scene calls for; see kernels_*.cpp for the instances.
+/// The path tracer's estimate, and what it does at a surface, compiled for what surfaces call for; see
+/// kernels_*.cpp for the instances.
 namespace vlx::render {
 
 inline float powerHeuristic(float own, float other) {
@@ -12,7 +13,6 @@ inline float powerHeuristic(float own, float other) {
 }
 
 /// Of a camera ray's radiance: one light's at each vertex, and what is met by chance, MIS-weighted.
-template <Features F>
 class PathEstimate {
   public:
     explicit PathEstimate(const PathContext& in)
@@ -22,35 +22,33 @@ class PathEstimate {
 
     const Rgb& radiance() const { return radiance_; }
 
-    void meet(const Walk<F>& walk, const MetLight& met) {
+    void meet(const Walk& walk, const MetLight& met) {
         radiance_ += walk.throughput * met.radiance * chanceWeight(met, walk.ray.direction);
     }
 
-    void gather(const Walk<F>& walk, const PathVertex<F>& vertex, const BouncePairs& pairs,
-                std::uint32_t seed) {
+    template <Features F>
+    void gather(const Walk& walk, const PathVertex<F>& vertex, const BouncePairs& pairs, std::uint32_t seed) {
         lightsSampled_ = vertex.side.bsdf.hasSmoothLobe() && !in_.lights.empty() &&
                          in_.options.strategy != Strategy::BsdfOnly;
         if (!lightsSampled_) return;
         const SurfacePoint& point = vertex.point;
-        in_.lights.prepare(local_,
-                           {point.position, point.shadingNormal, F.glass && point.material->transmissive()});
+        in_.lights.prepare(local_, {point.position, point.shadingNormal, point.material->transmissive()});
         const float choice = choosesLights_ ? pairs[dimension::kLightChoice].x : 0;
         radiance_ += walk.throughput * direct(vertex, choice, pairs[dimension::kLight], walk.ray.time, seed);
     }
 
+    template <Features F>
     void scatter(const PathVertex<F>&, const BsdfSample& next, const Vec3&) {
         bsdfPdf_ = next.pdf;
         lightsSampled_ = lightsSampled_ && !next.delta;
-        if constexpr (F.rare) {
-            scattered_ = scattered_ || !next.delta;
-            caustic_ = dropsCaustics_ && scattered_ && next.delta;
-        }
+        scattered_ = scattered_ || !next.delta;
+        caustic_ = dropsCaustics_ && scattered_ && next.delta;
     }
 
   private:
     /// Weight of light that the BSDF's sampling found.
     float chanceWeight(const MetLight& met, const Vec3& direction) const {
-        if (F.rare && caustic_) return 0;
+        if (caustic_) return 0;
         if (!lightsSampled_ || in_.options.strategy == Strategy::BsdfOnly) return 1;
         if (in_.options.strategy == Strategy::LightsOnly) return 0;
         if (met.light < 0) return 1;
@@ -60,6 +58,7 @@ class PathEstimate {
     }
 
     /// One light's contribution at a vertex.
+    template <Features F>
     Rgb direct(const PathVertex<F>& vertex, float choice, Vec2 u, float time, std::uint32_t seed) const {
         const LightSample light = in_.lights.sample(local_, choice, u);
         if (!(light.pdf > 0) || isBlack(light.radiance)) return {};
@@ -84,21 +83,15 @@ class PathEstimate {
     bool caustic_ = false;        // then by smooth ones only
 };
 
-template <Features F>
-PathSample tracePath(const PathContext& in, const Ray& ray, const PathSampler& sampler) {
-    PathEstimate<F> estimate(in);
-    PathSample sample = eyeSubpath<F>(in, ray, sampler, estimate);
-    sample.radiance = estimate.radiance();
-    return sample;
-}
+using PathStep = bool(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
 
 // Compiled in kernels_*.cpp.
-extern template PathSample tracePath<kMatte>(const PathContext&, const Ray&, const PathSampler&);
-extern template PathSample tracePath<kMatteTextured>(const PathContext&, const Ray&, const PathSampler&);
-extern template PathSample tracePath<kReflecting>(const PathContext&, const Ray&, const PathSampler&);
-extern template PathSample tracePath<kReflectingTextured>(const PathContext&, const Ray&, const PathSampler&);
-extern template PathSample tracePath<kLayered>(const PathContext&, const Ray&, const PathSampler&);
-extern template PathSample tracePath<kLayeredTextured>(const PathContext&, const Ray&, const PathSampler&);
-extern template PathSample tracePath<kEveryFeature>(const PathContext&, const Ray&, const PathSampler&);
+extern template bool scatterAt<kMatte>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+extern template bool scatterAt<kMatteTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+extern template bool scatterAt<kReflecting>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+extern template bool scatterAt<kReflectingTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+extern template bool scatterAt<kLayered>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+extern template bool scatterAt<kLayeredTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+extern template bool scatterAt<kEveryFeature>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
 
 }  // namespace vlx::render

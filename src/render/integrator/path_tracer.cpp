@@ -1,21 +1,26 @@
 #include "render/integrator/path_tracer.h"
 
+#include <algorithm>
+
 #include "render/integrator/path_kernel.h"
+#include "render/plan/material_range.h"
 
 namespace vlx::render {
 namespace {
 
-/// What effects take of a kernel.
-Features featuresFor(const EffectSet& effects, const EffectSet& leftOut, const Scene& scene) {
-    using enum Effect;
-    Features f;
-    f.layers = effects.hasAny({Clearcoat, Sheen});
-    f.glass = effects.hasAny({Transmission, RoughTransmission});
-    f.reflection = f.layers || f.glass || effects.hasAny({Glossy, Mirror});
-    f.textures = effects.hasAny({Textures, NormalMaps}) || !scene.colours.empty();
-    f.rare = effects.hasAny({Absorption, ObjectMotion}) || !leftOut.none();
-    return f;
-}
+struct Kernel {
+    Features features;
+    bool (*scatterAt)(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+};
+
+/// Smallest first.
+constexpr std::array kKernels = [] {
+    const auto of = []<Features F>() { return Kernel{F, &scatterAt<F, PathEstimate>}; };
+    return std::array{of.operator()<kMatte>(),       of.operator()<kMatteTextured>(),
+                      of.operator()<kReflecting>(),  of.operator()<kReflectingTextured>(),
+                      of.operator()<kLayered>(),     of.operator()<kLayeredTextured>(),
+                      of.operator()<kEveryFeature>()};
+}();
 
 bool covers(const Features& kernel, const Features& wanted) {
     const auto implies = [](bool a, bool b) { return !a || b; };
@@ -24,26 +29,46 @@ bool covers(const Features& kernel, const Features& wanted) {
            implies(wanted.rare, kernel.rare);
 }
 
+/// What a surface of a shape calls for.
+Features featuresOf(const Scene& scene, std::size_t index, const MaterialRange& range, bool moves) {
+    const Shape& shape = scene.shapes[index];
+    Features f;
+    f.layers = range.clearcoat || range.sheen;
+    f.glass = range.transmission || range.roughTransmission;
+    f.reflection = f.layers || f.glass || range.glossy || range.mirror;
+    f.textures = scene.materials[shape.material].textured || shape.firstColour >= 0;
+    f.rare = moves && (shape.deformation >= 0 || index >= scene.worldShapes);
+    return f;
+}
+
 }  // namespace
 
 PathTracer::PathTracer(const Scene& scene, const Accelerator& accelerator, const View& view,
                        const PathOptions& options)
     : Integrator(view, options.effects),
-      context_(scene, accelerator, options, options.effects == EffectSet::all()),
-      kernel_(&tracePath<kEveryFeature>) {
-    const Features wanted = featuresFor(options.effects, options.leftOut, scene);
-    // Smallest first. One with everything but the rare parts serves what none of the smaller ones does.
-    const auto offer = [&]<Features F>() {
-        if (features_ != kEveryFeature || !covers(F, wanted)) return;
-        features_ = F;
-        kernel_ = &tracePath<F>;
-    };
-    offer.operator()<kMatte>();
-    offer.operator()<kMatteTextured>();
-    offer.operator()<kReflecting>();
-    offer.operator()<kReflectingTextured>();
-    offer.operator()<kLayered>();
-    offer.operator()<kLayeredTextured>();
+      context_(scene, accelerator, options, options.effects == EffectSet::all()) {
+    const bool general = options.effects == EffectSet::all() || !options.leftOut.none();
+    kernels_.assign(scene.shapes.size(), kKernels.size() - 1);
+    if (general) return;
+    const MaterialRanges ranges(scene);
+    for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
+        const Features wanted = featuresOf(scene, i, ranges.of(scene.shapes[i].material),
+                                           options.effects.has(Effect::ObjectMotion));
+        const auto smallest = std::ranges::find_if(
+            kKernels, [&](const Kernel& kernel) { return covers(kernel.features, wanted); });
+        kernels_[i] = static_cast<std::uint8_t>(smallest - kKernels.begin());
+    }
 }
+
+PathSample PathTracer::along(const Ray& ray, const PathSampler& sampler) const {
+    PathEstimate estimate(context_);
+    PathSample sample = eyeSubpath(context_, ray, sampler, estimate, [&](EyePath& path, const Hit& hit) {
+        return kKernels[kernels_[hit.shape]].scatterAt(path, hit, sampler, estimate);
+    });
+    sample.radiance = estimate.radiance();
+    return sample;
+}
+
+const Features& PathTracer::featuresAt(std::size_t shape) const { return kKernels[kernels_[shape]].features; }
 
 }  // namespace vlx::render

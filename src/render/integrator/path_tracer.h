@@ -9,32 +9,28 @@ namespace vlx::render {
 /// heuristic (Veach, "Robust Monte Carlo methods for light transport simulation", 1997) and Russian roulette
 /// by throughput. Unbiased up to `maxBounces`.
 ///
-/// There are several kernels, each compiled with some features only: the smallest that has what
-/// `options.effects` asks for is used. All of them give the same bits.
+/// There are several kernels, each compiled with some features only: at each surface the smallest works that
+/// has what the surface's material calls for; the one with everything where all `options.effects` are asked
+/// for. All of them give the same bits.
 class PathTracer final : public Integrator {
   public:
     PathTracer(const Scene& scene, const Accelerator& accelerator, const View& view,
                const PathOptions& options);
 
     /// What comes in along any ray.
-    PathSample along(const Ray& ray, const PathSampler& sampler) const {
-        return kernel_(context_, ray, sampler);
-    }
+    PathSample along(const Ray& ray, const PathSampler& sampler) const;
 
-    /// Of the kernel in use.
-    const Features& features() const { return features_; }
+    /// Of the kernel that works on a shape's surface.
+    const Features& featuresAt(std::size_t shape) const;
 
   private:
-    using Kernel = PathSample (*)(const PathContext&, const Ray&, const PathSampler&);
-
     PathSample traceRay(const Ray& ray, Vec2, const PathSampler& sampler, std::vector<Splat>&,
                         Rgb*) const override {
         return along(ray, sampler);
     }
 
     PathContext context_;
-    Features features_ = kEveryFeature;
-    Kernel kernel_;
+    std::vector<std::uint8_t> kernels_;  ///< of each shape
 };
 
 }  // namespace vlx::render

@@ -41,22 +41,12 @@ struct Side {
     BasicBsdf<F> bsdf;
 };
 
-template <Features F>
 struct Walk;
 
 /// Where a subpath scatters. `Point`: SurfacePoint, or a reference to one that outlives the vertex.
 template <Features F, class Point = const SurfacePoint&>
 struct PathVertex {
-    PathVertex(const Walk<F>& walk, const SurfacePoint& met)
-        : point(met),
-          surface(walk.parameters(point)),
-          back(-walk.ray.direction),
-          side(walk.in.scene, point, surface, back) {
-        if constexpr (F.rare) {
-            medium = walk.medium;
-            if (!point.fromBehind && walk.absorbs(*point.material)) beyond = point.material;
-        }
-    }
+    PathVertex(const Walk& walk, const SurfacePoint& met);
 
     Point point;  ///< as seen from the vertex before
     SurfaceParameters surface;
@@ -72,16 +62,12 @@ struct PathVertex {
     }
     /// Part that arrives of light that starts at a distance in `direction`.
     Rgb arriving(const Vec3& direction, float distance) const {
-        if constexpr (F.rare) {
-            const Material* through = dot(point.geometricNormal, direction) < 0 ? beyond : medium;
-            if (through != nullptr) return transmitted(through->absorption, distance);
-        }
-        return Rgb(1);
+        const Material* through = dot(point.geometricNormal, direction) < 0 ? beyond : medium;
+        return through != nullptr ? transmitted(through->absorption, distance) : Rgb(1);
     }
 };
 
 /// A subpath on its way.
-template <Features F>
 struct Walk {
     const PathContext& in;
     Ray ray;  ///< that it goes on by
@@ -90,16 +76,16 @@ struct Walk {
     int bounces = 0;                   ///< scattering events so far
     double way = 0;                    ///< from the last of them, or the start, to the surface that was met
 
-    bool absorbs(const Material& material) const { return F.rare && in.absorbs && material.absorbs(); }
+    bool absorbs(const Material& material) const { return in.absorbs && material.absorbs(); }
 
     /// Goes `distance` along the ray.
     void travel(float distance) {
         way += distance;
-        if constexpr (F.rare)
-            if (medium != nullptr) throughput *= transmitted(medium->absorption, distance);
+        if (medium != nullptr) throughput *= transmitted(medium->absorption, distance);
     }
 
     /// Goes to the surface that the ray has met.
+    template <Features F>
     SurfacePoint arrive(const Hit& hit) {
         const SurfacePoint point = surfacePoint<F>(in.scene, hit, ray.direction, ray.time);
         // A ray that starts inside learns so when it meets the solid's surface from behind.
@@ -108,6 +94,7 @@ struct Walk {
         return point;
     }
 
+    template <Features F>
     SurfaceParameters parameters(const SurfacePoint& point) const {
         SurfaceParameters surface = parametersAt<F>(in.scene, point);
         if constexpr (F.rare) surface.leftOut = in.options.leftOut;
@@ -119,20 +106,28 @@ struct Walk {
 
     /// Goes on from a vertex, which has scattered; roulette lets the path live with probability `survival`,
     /// decided by `u`. Returns whether it lives.
-    template <class Point>
+    template <Features F, class Point>
     bool goOn(const PathVertex<F, Point>& vertex, const BsdfSample& scattered, const Vec3& direction,
               float survival, float u) {
         if (bounces >= kSureBounces) {
             if (u >= survival) return false;
             throughput *= 1 / survival;
         }
-        if constexpr (F.rare)
-            if (scattered.through) medium = vertex.beyond;
+        if (scattered.through) medium = vertex.beyond;
         ray = leave(vertex.point, direction, ray.time);
         ++bounces;
         way = 0;
         return true;
     }
 };
+
+template <Features F, class Point>
+PathVertex<F, Point>::PathVertex(const Walk& walk, const SurfacePoint& met)
+    : point(met),
+      surface(walk.parameters<F>(point)),
+      back(-walk.ray.direction),
+      medium(walk.medium),
+      beyond(!point.fromBehind && walk.absorbs(*point.material) ? point.material : nullptr),
+      side(walk.in.scene, point, surface, back) {}
 
 }  // namespace vlx::render
