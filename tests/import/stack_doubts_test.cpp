@@ -166,8 +166,10 @@ TEST(StackAppend, SamplesAreAddedAfterThoseOfADump) {
     StackOptions options;
     options.append = folder / "first.exr";
     const ImportReport report = stackImages(more, folder / "both.exr", options);
-    EXPECT_TRUE(anyContains(report.notes, "replicates go on from 2"));
-    EXPECT_FALSE(anyContains(report.notes, "already"));
+    EXPECT_TRUE(anyContains(report.notes, "They are added to the 2 samples a pixel of " + options.append +
+                                              ", which makes 5; replicates go on from 2"));
+    for (const char* said : {"already", "nothing about positions", "Normals are taken"})
+        EXPECT_FALSE(anyContains(report.notes, said)) << said;
     const DumpReader all(folder / "all.exr"), both(folder / "both.exr");
     EXPECT_EQ(both.header().samples, 5.0);
     std::vector<std::string> names;
