@@ -156,7 +156,7 @@ sys.exit(done.returncode)
 
     def test_missing_textures_are_named(self):
         said = self.run_it("textures.blend", "a.exr", *QUICK, "-q")
-        self.assertIn(os.path.join(SCENES, "textures", "bricks.png"), said)
+        self.assertIn("names 1 file that is not there: " + os.path.join(SCENES, "textures", "bricks.png"), said)
 
     def test_a_file_of_a_newer_blender(self):
         data = contents(os.path.join(SCENES, "plain.blend"))
@@ -212,28 +212,38 @@ class Sequences(Case):
         said = self.run_it("blurred.blend", "t_##.exr", "--frames", "1-2", "--temporal", "1", *QUICK)
         self.assertIn("with motion blur Blender writes no motion vectors", said)
 
-    def test_two_runs_in_one_folder(self):
-        runs = [subprocess.Popen(self.command("plain.blend", "f_##.exr", "--frames", "1-2", *QUICK), stderr=subprocess.PIPE, text=True)
-                for _ in range(2)]
-        for one in runs:
-            said = one.communicate()[1]
-            self.assertEqual(one.returncode, 0, said)
-        self.assertEqual(self.left(), ["f_01.exr", "f_02.exr"])
-        self.run_it("plain.blend", "g.exr", "--frames", "2", *QUICK)
-        self.assertEqual(exr.read(self.path("f_02.exr"))[0], exr.read(self.path("g.exr"))[0])
+    def test_runs_in_one_folder(self):
+        os.mkdir(self.path(".vlx-blender-killed"))  # what a run that was killed has left: no lock
+        with open(self.path(".vlx-blender-killed/run"), "w") as file:
+            json.dump({"process": 1, "host": "here", "pictures": ["f_01.exr", "f_02.exr"]}, file)
+        said = []
+        for frames in (["1-2", "1-2", "3"], ["2"]):
+            runs = [subprocess.Popen(self.command("plain.blend", "f_##.exr", "--frames", each, *QUICK), stderr=subprocess.PIPE, text=True)
+                    for each in frames]
+            said += [(one.communicate()[1], one.returncode) for one in runs]
+        self.assertEqual(sorted(code for _, code in said), [0, 0, 0, 1], said)
+        refused = next(text for text, code in said if code)
+        self.assertRegex(refused, r"f_01.exr and 1 more: expected no other vlx-blender at work on it, found process \d+ on .*: wait")
+        self.assertEqual(said[2][1], 0)
+        self.assertIn("f_02.exr: is finished", said[3][0])
+        self.assertEqual(self.left(), [".vlx-blender-killed", "f_01.exr", "f_02.exr", "f_03.exr"])
 
 
 class Ends(Case):
-    def end_by(self, number):
+    def end_by(self, number, **how):
         with open(self.path("blender"), "w") as file:
             file.write(f"#!/bin/sh\necho $$ >{self.path('pid')}\nexec blender \"$@\"\n")
         os.chmod(self.path("blender"), 0o755)
         os.mkdir(self.path("out"))
         command = self.command("plain.blend", "out/f_##.exr", "--frames", "1-900", "--log", "json", "--blender", self.path("blender"))
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **how) as run:
             for line in run.stderr:
                 if json.loads(line)["event"] == "frame":
                     break
+            if how:
+                run.send_signal(signal.SIGINT)  # ignored
+                time.sleep(0.3)
+                self.assertIsNone(run.poll())
             run.send_signal(number)
             run.stderr.read()
         self.assertEqual(run.returncode, -number)
@@ -245,8 +255,8 @@ class Ends(Case):
         with self.assertRaises(ProcessLookupError):
             os.kill(int(contents(self.path("pid"))), 0)
 
-    def test_terminated(self):
-        self.end_by(signal.SIGTERM)
+    def test_terminated_in_the_background(self):
+        self.end_by(signal.SIGTERM, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))  # as `vlx-blender &` in sh
 
     def test_interrupted(self):
         self.end_by(signal.SIGINT)
@@ -296,6 +306,7 @@ class BadInput(Case):
         said = self.run_it(scene, output, *options, code=code)
         self.assertIn(expected, said)
         self.assertEqual([name for name in self.left() if name.endswith(".exr") or name.startswith(".")], [])
+        return said
 
     def test_scenes(self):
         self.told("none.blend: cannot be read: No such file or directory", "none.blend")
@@ -309,7 +320,14 @@ class BadInput(Case):
     def test_usage(self):
         self.told("expected #### for the number of each of 2 frames", "plain.blend", "a.exr", "--frames", "1-2", code=2)
         self.told("expected a name that ends with .exr", "plain.blend", "a.png", code=2)
-        self.told("expected one of draft|standard|high, found 'best'", "plain.blend", "a.exr", "--", "--quality", "best", code=2)
+        no_blender = ["--blender", "/bin/false"]  # found out before that
+        for expected, *krige in (("expected one of draft|standard|high, found 'best'", "--quality", "best"),
+                                 ("--sigma goes with --method gaussian", "--sigma", "2"),
+                                 ("--samples: goes with a flat image", "--samples=4"), ("found one that only prints something", "--help"),
+                                 ("--diagnostics: goes without the layers", "--diagnostics")):
+            self.told(expected, "plain.blend", "a.exr", *no_blender, "--", *krige, code=2)
+        self.told("how good a frame is would depend on how many images its neighbours get. Take one of them; with --temporal choose "
+                  "--images", "plain.blend", "a_##.exr", "--temporal", "1", "--target-error", "relmse=1", code=2)
         self.told("--frames: expected before --", "plain.blend", "a.exr", "--", "--frames", "1", code=2)
         self.told("expected frames such as 1-100x2,150, found '4-1'", "plain.blend", "a_##.exr", "--frames", "4-1", code=2)
         self.told("expected one of ViewLayer, found 'Foreground'", "plain.blend", "a.exr", "--view-layer", "Foreground", code=2)
@@ -321,6 +339,13 @@ class BadInput(Case):
     def test_places(self):
         self.told("expected the folder", "plain.blend", "none/a.exr")
         self.told("no-such-blender: expected Blender 3.4 or later", "plain.blend", "a.exr", "--blender", "no-such-blender")
+        said = self.told("/bin/false: expected Blender 3.4 or later, found a program that ended (exit code 1) without a word of Blender's "
+                         "(--blender PATH)", "plain.blend", "a.exr", "--blender", "/bin/false")
+        self.assertNotIn("plain.blend", said)
+        self.told("/proc: expected a folder that can be written into", "plain.blend", "/proc/a.exr")
+        os.mkdir(self.path("folder.exr"))
+        said = self.run_it("plain.blend", "folder.exr", code=1)
+        self.assertIn("folder.exr: expected a place for a picture, found a folder", said)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ from .log import Failure
 
 AHEAD = 2            # frames that may wait for kriging, so that the disk does not fill with them
 ERROR_FALLS = 0.6    # as samples ** -0.6, measured over scenes
-OPINIONS = ("--denoiser", "--denoised")  # options of vlx-krige that go without --radiance
 MOST_AT_ONCE = 3     # times as many images as there are, in one step towards the wanted error
 
 
@@ -27,6 +26,7 @@ class Options:
     target: float           # 0: none
     most_images: int
     keep: str               # a folder for dumps, or empty
+    keeping: str            # a hidden folder there, for what is not complete
     krige: list             # options of vlx-krige
     first_sample: int       # number of the first image's first sample
 
@@ -175,12 +175,11 @@ class Shot:
         return [f for f, window in self.windows.items() if not self.frames[f].kriged and all(self.frames[i].packed for i in window)]
 
     def krige_arguments(self, numbers):
-        options = [*self.radiance]
-        if any(word.split("=")[0] in OPINIONS for word in self.options.krige):
-            options = []
-            if self.radiance:
-                self.warn("WARNING: with another denoiser's image light groups and contributions are the samples' mean, as noisy as "
-                          "that: they would not add up to the picture")
+        without = radiance_goes_not_with(self.options.krige)
+        options = [] if without else [*self.radiance]
+        if without and self.radiance:
+            self.warn(f"WARNING: with {without} light groups and contributions are the samples' mean, as noisy as that, and may not "
+                      "add up to the picture")
         if self.options.temporal:
             options += ["--temporal", str(self.options.temporal)]
         return [self.dumps(), "-o", self.pictures(), "--template", self.templates(), "--frames", ",".join(map(str, numbers)),
@@ -244,8 +243,9 @@ class Shot:
                 continue
             if self.options.keep:
                 kept = frames.name_of(kept_name(self.options), frame.number)
-                shutil.move(dump, kept + ".part")
-                os.replace(kept + ".part", kept)
+                part = os.path.join(self.options.keeping, os.path.basename(kept))
+                shutil.move(dump, part)
+                os.replace(part, kept)
             self.remove([dump, frames.name_of(self.templates(), frame.number)])
 
     @staticmethod
@@ -269,6 +269,17 @@ class Shot:
         if code != 0:
             raise Failure(failure.replace(self.temporary + os.sep, "") or f"{program} ended with exit code {code}")
         return out
+
+
+def radiance_goes_not_with(krige):
+    """Which of vlx-krige's options it is that --radiance goes without; empty: none."""
+    for word, value in zip(krige, [*krige[1:], ""]):
+        name, _, own = word.partition("=")
+        if name in ("--denoiser", "--denoised"):
+            return name
+        if name == "--method" and (own or value) != "krige":
+            return f"--method {own or value}"
+    return ""
 
 
 def kept_name(options):
