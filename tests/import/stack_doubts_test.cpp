@@ -121,6 +121,15 @@ TEST(StackDoubts, WhatATransparentFilmMissesStaysASample) {
     EXPECT_TRUE(anyContains(report.notes, "kept as a transparent film's misses"));
 }
 
+TEST(StackDoubts, ACardBeforeNothingIsNoRenderBorder) {
+    const TemporaryFolder folder;
+    const auto card = [](float x, float y) { return x >= 9.2f && x < 30.8f && y >= 5.2f && y < 24.8f; };
+    const auto images = render(folder, 12, false, inside(kTilted, card));
+    const ImportReport report = stackImages(images, folder / "d.exr", {});
+    EXPECT_TRUE(anyContains(report.notes, "kept as a transparent film's misses"));
+    EXPECT_EQ(DumpReader(folder / "d.exr").read(0, 30).samples(), 14400u);
+}
+
 TEST(StackDoubts, TheDepthPassTellsMissesFromWhatWasNotRendered) {
     const TemporaryFolder folder;
     std::vector<std::string> channels = kPasses;

@@ -162,7 +162,7 @@ class Shot:
         images = [self.image(frame.number, i) for i in range(frame.images)]
         dump, passes = (frames.name_of(name, frame.number) for name in (self.dumps(), self.templates()))
         report = self.ran("vlx-pack", "stack", *images, "-o", dump, "--overwrite", "--preset", "cycles", "--groups", "auto",
-                          "--passes", passes)
+                          "--passes", passes, "--keep-empty")  # there is no border: all pixels are rendered
         for line in report.splitlines():
             if line.strip().startswith("For vlx-krige:"):
                 self.radiance = shlex.split(line.split(":", 1)[1])
