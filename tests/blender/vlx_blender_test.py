@@ -154,8 +154,9 @@ sys.exit(done.returncode)
         self.run_it("eevee.blend", "a.exr", "--engine", "CYCLES", *QUICK)
         self.assertEqual(self.left(), ["a.exr"])
 
-    def test_missing_textures_are_named(self):
-        said = self.run_it("textures.blend", "a.exr", *QUICK, "-q")
+    def test_missing_textures_and_other_methods(self):
+        said = self.run_it("textures.blend", "a.exr", *QUICK, "-q", "--", "--method", "mean")
+        self.assertIn("WARNING: with --method mean light groups and contributions are the samples' mean", said)
         self.assertIn("names 1 file that is not there: " + os.path.join(SCENES, "textures", "bricks.png"), said)
 
     def test_a_file_of_a_newer_blender(self):

@@ -159,8 +159,9 @@ def check_about(about, o, log):
 def check_krige_options(o, krige, programs, temporary):
     """Bad usage is found now, not after the first frame: there is no dump, so nothing is kriged."""
     none = os.path.join(temporary, "none_####.exr")
+    temporal = ["--temporal", str(o.temporal)] if o.temporal else []
     code, _, _, failure = programs.run("vlx-krige", none, "-o", os.path.join(temporary, "kriged_####.exr"), "--template", none,
-                                       "--frames", "0", "--temporal", str(o.temporal), *krige, "--log", "json")
+                                       "--frames", "0", *temporal, *krige, "--log", "json")
     if code == BAD_USAGE:
         raise Usage(f"options of vlx-krige: {failure.removeprefix('vlx-krige: ').split(chr(10))[0]}")
     if code == DONE:

@@ -244,8 +244,11 @@ class Shot:
             if self.options.keep:
                 kept = frames.name_of(kept_name(self.options), frame.number)
                 part = os.path.join(self.options.keeping, os.path.basename(kept))
-                shutil.move(dump, part)
-                os.replace(part, kept)
+                try:
+                    shutil.move(dump, part)
+                    os.replace(part, kept)
+                except OSError as error:
+                    raise Failure(f"{kept}: cannot be written: {error.strerror}") from None
             self.remove([dump, frames.name_of(self.templates(), frame.number)])
 
     @staticmethod
@@ -267,7 +270,8 @@ class Shot:
         for message in [*messages, *warnings]:
             self.warn(message.replace(self.temporary + os.sep, ""))
         if code != 0:
-            raise Failure(failure.replace(self.temporary + os.sep, "") or f"{program} ended with exit code {code}")
+            what = failure.replace(self.temporary + os.sep, "") or f"{program} ended with exit code {code}"
+            raise Failure(f"{self.options.output}: {what}")
         return out
 
 
