@@ -3,6 +3,7 @@
 import argparse
 import os
 import pathlib
+import shlex
 import shutil
 import signal
 import sys
@@ -13,7 +14,7 @@ from .blender import Blender, check_scene_file
 from .claim import FOLDER, claim
 from .log import BAD_USAGE, DONE, FAILED, PASSED, Failure, Log, Usage, counted
 from .processes import Children, Programs
-from .shot import Options, Shot, kept_name
+from .shot import Options, Shot, kept_name, named
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 OWN = {"-o", "--output", "--template", "--drop-layers", "--frames", "--temporal", "--radiance", "--json", "--log", "--overwrite",
@@ -82,7 +83,7 @@ def parser():
     add("--temporal", type=whole(0, 8), default=0, metavar="N", help="Data of N frames before and N after add to each frame, moved by Blender's motion vectors. Best without motion blur, with which Blender writes none")
     add("--engine", choices=["CYCLES"], help="Render with Cycles a file that is set to another engine, which is else refused")
     add("--view-layer", metavar="NAME", help="The view layer to render (default: the first one that is rendered)")
-    add("--keep-samples", metavar="FOLDER", help="Keep the samples of each frame there, as samples_OUTPUT, for vlx-krige")
+    add("--keep-samples", metavar="FOLDER", help="Keep the samples of each frame in this folder, which is made if need be, as samples_OUTPUT, for vlx-krige")
     add("--blender", metavar="PATH", default="blender", help="Blender's program")
     add("--threads", type=whole(0, 1024), default=0, metavar="N", help="Of Blender and of vlx-krige, which run at the same time. 0: all processors")
     add("--overwrite", action="store_true", help="Render frames even if their pictures are there and were made by these programs from the same file with the same options, which are else skipped. Textures and linked files are not looked at")
@@ -112,14 +113,28 @@ def check(o, krige):
     if o.temporal and o.target_error:
         raise Usage("--target-error goes without --temporal: how good a frame is would depend on how many images its neighbours get. "
                     "Take one of them; with --temporal choose --images for the whole shot")
+    if o.frames:
+        check_frames(o, frames.parse(o.frames))
+    if not frames.has_place(o.output):
+        check_place(o.output)
     if o.max_images < o.images:
         raise Usage(f"--max-images: expected at least --images, {o.images}, found {o.max_images}")
     check_scene_file(o.scene)
-    for option, folder in (("--output", os.path.dirname(o.output) or "."), ("--keep-samples", o.keep_samples)):
-        if folder and not os.path.isdir(folder):
-            raise Failure(f"{option}: expected the folder '{folder}', found none")
-        if folder and not os.access(folder, os.W_OK | os.X_OK):
-            raise Failure(f"{option}: expected a folder that can be written into, found '{folder}', which cannot")
+    folder = os.path.dirname(o.output) or "."
+    if not os.path.isdir(folder):
+        raise Failure(f"--output: expected the folder '{folder}', found none")
+
+
+def check_place(picture):
+    if os.path.isdir(picture):
+        raise Failure(f"{picture}: expected a place for a picture, found a folder")
+
+
+def check_frames(o, chosen):
+    if len(chosen) > 1 and not frames.has_place(o.output):
+        raise Usage(f"--output: expected #### for the number of each of {len(chosen)} frames, found '{o.output}'")
+    if o.temporal and len(chosen) > 1 and not any(f + 1 in chosen for f in chosen):
+        raise Usage("--temporal: expected frames that follow each other, found none with a neighbour")
 
 
 def check_about(about, o, log):
@@ -166,22 +181,23 @@ def check_krige_options(o, krige, programs, temporary):
         raise Usage(f"options of vlx-krige: {failure.removeprefix('vlx-krige: ').split(chr(10))[0]}")
     if code == DONE:
         raise Usage("options of vlx-krige: expected those of kriging, found one that only prints something (vlx-krige --help)")
+    for command in (value for name, value in named(krige) if name == "--denoiser"):
+        program = "oidnDenoise" if command == "oidn" else shlex.split(command)[0]
+        if not shutil.which(program):
+            raise Failure(f"--denoiser: expected the program {program} in PATH, found none")
 
 
 def chosen_frames(o, about):
     if o.frames:
-        chosen = frames.parse(o.frames)
-    elif frames.has_place(o.output):
+        return frames.parse(o.frames)
+    if frames.has_place(o.output):
         first, last, step = about["frames"]
         chosen = list(range(first, last + 1, step))
     else:
         chosen = [about["frame"]]
-    if len(chosen) > 1 and not frames.has_place(o.output):
-        raise Usage(f"--output: expected #### for the number of each of {len(chosen)} frames, found '{o.output}'")
     if not chosen or chosen[0] < 0:
         raise Failure(f"{o.scene}: expected frames from 0, found {about['frames'][0]} to {about['frames'][1]} (--frames)")
-    if o.temporal and len(chosen) > 1 and not any(f + 1 in chosen for f in chosen):
-        raise Usage("--temporal: expected frames that follow each other, found none with a neighbour")
+    check_frames(o, chosen)
     return chosen
 
 
@@ -213,6 +229,7 @@ def run(o, krige, folders, log, children):
 def hidden_folder(place, hidden):
     """For what is not complete; entered into `hidden`."""
     try:
+        os.makedirs(place, exist_ok=True)
         hidden.append(os.path.abspath(tempfile.mkdtemp(prefix=FOLDER, dir=place)))
     except OSError as error:
         raise Failure(f"{place}: expected a folder that can be written into: {error.strerror}") from None
@@ -237,8 +254,7 @@ def render(o, krige, programs, log, children, temporary, keeping):
     wanted = [frame for frame in chosen if not is_finished(frame)]
     pictures = [frames.name_of(o.output, frame) for frame in wanted]
     for picture in pictures:
-        if os.path.isdir(picture):
-            raise Failure(f"{picture}: expected a place for a picture, found a folder")
+        check_place(picture)
     if wanted:
         taken = claim(temporary, pictures)  # until it is closed, with the run
         wanted = [frame for frame in wanted if not is_finished(frame)]  # meanwhile, by another run

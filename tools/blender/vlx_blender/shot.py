@@ -275,14 +275,20 @@ class Shot:
         return out
 
 
-def radiance_goes_not_with(krige):
-    """Which of vlx-krige's options it is that --radiance goes without; empty: none."""
+def named(krige):
+    """vlx-krige's options with their values."""
     for word, value in zip(krige, [*krige[1:], ""]):
         name, _, own = word.partition("=")
+        yield name, own or value
+
+
+def radiance_goes_not_with(krige):
+    """Which of vlx-krige's options it is that --radiance goes without; empty: none."""
+    for name, value in named(krige):
         if name in ("--denoiser", "--denoised"):
             return name
-        if name == "--method" and (own or value) != "krige":
-            return f"--method {own or value}"
+        if name == "--method" and value != "krige":
+            return f"--method {value}"
     return ""
 
 
