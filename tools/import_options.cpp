@@ -1,9 +1,12 @@
 #include "import_options.h"
 
 #include <algorithm>
+#include <map>
 
 #include "exr/flat_images.h"
 #include "tool_main.h"
+#include "variolux/base/channel_names.h"
+#include "variolux/base/text.h"
 
 namespace vlx {
 
@@ -34,6 +37,13 @@ void bindMap(CLI::App& app, std::vector<std::string>& mappings) {
         ->type_name("NAME=SOURCE")
         ->expected(1)
         ->take_all();
+}
+
+void bindLayer(CLI::App& app, std::string& layer) {
+    app.add_option("--layer", layer,
+                   "Where R, G, B are: a layer (beauty, ViewLayer.Combined_key) or the view layer whose "
+                   "Combined to take (ViewLayer2)")
+        ->option_text("NAME");
 }
 
 void bindCompanions(CLI::App& app, CompanionImages& with) {
@@ -71,10 +81,7 @@ void MomentFlags::bind(CLI::App& app, const std::string& group) {
     app.add_option("--variance", options_.with.variance, "Image of the variance, if it is another file");
     bindCompanions(app, options_.with);
     bindSamples(app, options_.samples);
-    app.add_option("--layer", options_.layer,
-                   "Where R, G, B are: a layer (beauty, ViewLayer.Combined_key) or the view layer whose "
-                   "Combined to take (ViewLayer2)")
-        ->option_text("NAME");
+    bindLayer(app, options_.layer);
     bindMap(app, mappings_);
     for (CLI::Option* option : app.get_options())
         if (std::ranges::find(before, option) == before.end()) option->group(group);
@@ -100,10 +107,46 @@ std::vector<std::string*> MomentFlags::fileNames() {
     return {&with.variance, &with.albedo, &with.normal, &with.depth};
 }
 
+namespace {
+
+// A line for each view layer: Blender's files have ninety channels that nobody asked for. What is no channel
+// of a layer (of SBMC's files, for example) is a line of its own.
+std::string leftOut(const std::vector<std::string>& ignored) {
+    constexpr std::size_t kNamed = 4;
+    std::vector<std::vector<std::string>> lines;
+    std::map<std::string, std::size_t> ofLayer;
+    for (const std::string& name : ignored) {
+        const bool alone = layerOf(name).empty();
+        const std::size_t line =
+            alone ? lines.size() : ofLayer.emplace(layerPrefix(name), lines.size()).first->second;
+        if (line == lines.size()) lines.emplace_back();
+        lines[line].push_back(name);
+    }
+    std::string text;
+    for (const auto& names : lines) {
+        std::vector<std::string> shown = names;
+        if (names.size() > kNamed) {
+            shown.clear();
+            for (const std::string& name : names)
+                if (shown.empty() || shown.back() != layerOf(name)) shown.push_back(layerOf(name));
+            if (shown.size() > kNamed) {
+                shown.resize(kNamed);
+                shown.emplace_back("...");
+            }
+        }
+        text += "  left out: " +
+                (names.size() > kNamed ? std::to_string(names.size()) + " channels of " : std::string()) +
+                listed(shown) + "\n";
+    }
+    return text;
+}
+
+}  // namespace
+
 std::string toText(const ImportReport& report) {
     std::string text;
     for (const auto& [channel, source] : report.mapped) text += "  " + channel + " from " + source + "\n";
-    for (const auto& name : report.ignored) text += "  left out: " + name + "\n";
+    text += leftOut(report.ignored);
     for (const auto& part : report.missing) text += "  lacks " + part.what + ": " + part.cost + "\n";
     for (const auto& note : report.notes) text += note + "\n";
     return text;

@@ -13,6 +13,9 @@ namespace vlx {
 ChannelMap parseMappings(const std::vector<std::string>& mappings);
 void bindMap(CLI::App& app, std::vector<std::string>& mappings);
 
+/// --layer, where R, G, B are.
+void bindLayer(CLI::App& app, std::string& layer);
+
 /// --albedo, --normal, --depth.
 void bindCompanions(CLI::App& app, CompanionImages& with);
 

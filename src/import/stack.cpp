@@ -44,7 +44,9 @@ int wholeChunks(int rows) {
     return rows < kChunk / 2 ? rows : (rows + kChunk - 1) / kChunk * kChunk;
 }
 
-std::vector<std::string> ignoredChannels(const Names& names, const StackPlan& plan) {
+// What neither the dump nor the file of --passes has.
+std::vector<std::string> ignoredChannels(const Names& names, const StackPlan& plan, bool allPasses) {
+    if (allPasses) return {};
     Names taken, ignored;
     for (const StackChannel& channel : plan.channels) {
         for (const std::string& source : channel.recipe.sum) taken.push_back(channelFor(names, source).name);
@@ -155,25 +157,25 @@ ImportReport stackImages(const std::vector<std::string>& images, const std::stri
 
     ImportReport report;
     report.mapped = plan.mapped;
-    report.ignored = ignoredChannels(sources.channels(0), plan);
+    report.ignored = ignoredChannels(sources.channels(0), plan, passes.has_value());
     report.missing = missingChannels(header);
     auto& notes = report.notes;
     noteSamples(samples, notes);
-    if (!report.mapped.contains("sample.x"))
-        notes.push_back("The images say nothing about positions within pixels: none are written.");
-    if (report.mapped.contains("Z"))
-        notes.push_back(std::to_string(stacked.misses()) +
-                        " samples had a depth that is negative, not finite, or 1e9 and more (nothing hit): "
-                        "their Z is 0.");
-    noteMotion(report.mapped, stacked.motionless(), notes);
-    notePreset(plan, notes);
+    if (!earlier) {  // else said when that was made
+        if (!report.mapped.contains("sample.x"))
+            notes.push_back("The images say nothing about positions within pixels: none are written.");
+        if (stacked.misses() > 0)
+            notes.push_back(std::to_string(stacked.misses()) +
+                            " samples had a depth that is negative, not finite, or 1e9 and more (nothing "
+                            "hit): their Z is 0.");
+        noteMotion(report.mapped, stacked.motionless(), notes);
+        notePreset(plan, notes);
+    }
     sums.note(options, plan, sources.channels(0), halfLimit.anyHalf(), notes);
-    if (passes) note(notes, *passes);
+    if (passes) note(notes, *passes, earlier.has_value());
     noteRadiance(plan, notes);
     if (earlier) {
-        notes.push_back("They are added to the samples of " + options.append + "; replicates go on from " +
-                        std::to_string(earlier->firstReplicate()) + ".");
-        note(notes, *earlier, averaged);
+        note(notes, *earlier, images.size(), averaged);
         note(notes, duplicates, sources, options.append);
     }
     note(notes, rendered);

@@ -87,7 +87,7 @@ render.engine = "CYCLES"
 image = bpy.data.images.new("bricks", 4, 4)
 image.source, image.filepath = "FILE", "//textures/bricks.png"
 ball.data.materials.append(textured("bricks", image))
-save("textures.blend")
+save("textures.blend", compress=False)
 
 render.use_motion_blur = True
 save("blurred.blend")

@@ -221,15 +221,56 @@ TEST(VlxPackStack, NamesWithoutAPlaceForTheFrameAreBadUsage) {
     EXPECT_NE(both.err.find("with --frames LIST"), std::string::npos) << both.err;
 }
 
+TEST(VlxPackStack, TheNamedViewLayerIsTakenWithItsFeatures) {
+    const TemporaryFolder folder;
+    std::vector<std::string> names;
+    for (const char* layer : {"L.", "M."})
+        for (const char* pass : {"Combined.R", "Combined.G", "Combined.B", "Combined.A", "Combined_key.R",
+                                 "Combined_key.G", "Combined_key.B", "Denoising Depth.Z"})
+            names.push_back(std::string(layer) + pass);
+    ImageWriteOptions write;
+    write.attributes["cycles.M.samples"] = "4";
+    const std::string image = folder / "i.exr", out = folder / "d.exr";
+    writeImage(image, imageOf({0, 0, 2, 2}, names, [](int c, int, int) { return static_cast<float>(c); }),
+               write);
+    const ToolRun first = pack({"stack", image, "-o", out});
+    EXPECT_NE(first.out.find("  left out: 8 channels of M.Combined, M.Combined_key, M.Denoising Depth\n"),
+              std::string::npos)
+        << first.out;
+    const ToolRun run =
+        pack({"stack", image, "-o", out, "--layer", "M", "--groups", "auto", "--passes", folder / "p.exr"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_NE(run.out.find("of 4 samples each"), std::string::npos) << run.out;
+    EXPECT_NE(run.out.find("--radiance 'M.Combined_key'"), std::string::npos) << run.out;
+    const SampleBand band = DumpReader(out).read(0, 1, {"R", "Z", "M.Combined_key.G"});
+    EXPECT_EQ(band.values[0][0], 8);
+    EXPECT_EQ(band.values[1][0], 15);
+    EXPECT_EQ(band.values[2][0], 13);
+    EXPECT_EQ(pack({"stack", image, "-o", out, "--layer", "M.Combined_key"}).exitCode, 0);
+    EXPECT_EQ(DumpReader(out).read(0, 1, {"R"}).values[0][0], 12);
+    const ToolRun none = pack({"stack", image, "-o", out, "--layer", "N"});
+    EXPECT_EQ(none.exitCode, 1);
+    EXPECT_NE(none.err.find("expected a layer N of colours"), std::string::npos) << none.err;
+}
+
 TEST(VlxPackStack, AnEarlierDumpIsNotOverwritten) {
     const Shot shot;
     const std::string a = shot.folder / "f_0001_sA.exr", b = shot.folder / "f_0001_sB.exr";
     const std::string first = shot.folder / "a.exr", both = shot.folder / "b.exr";
-    EXPECT_EQ(pack({"stack", a, "-o", first}).exitCode, 0);
+    const ToolRun one = pack({"stack", a, "-o", first});
+    EXPECT_EQ(one.exitCode, 0);
+    EXPECT_TRUE(one.out.starts_with(first + ": 1 image\n")) << one.out;
+    EXPECT_EQ(one.out.find("samples had a depth"), std::string::npos) << one.out;
+    EXPECT_NE(one.out.find("  left out: L.Combined_key.R, L.Combined_key.G, L.Combined_key.B, L.Mist.Z\n"),
+              std::string::npos)
+        << one.out;
     EXPECT_EQ(pack({"stack", b, "-o", first, "--append", first}).exitCode, 2);
     EXPECT_EQ(pack({"stack", b, "-o", both, "--passes", both}).exitCode, 2);
     const ToolRun run = pack({"stack", b, "-o", both, "--append", first});
     EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_TRUE(run.out.starts_with(both + ": 1 image added to " + first + "\n")) << run.out;
+    EXPECT_NE(run.out.find("the 1 sample a pixel of " + first + ", which makes 2;"), std::string::npos)
+        << run.out;
     EXPECT_EQ(DumpReader(both).read(0, 1, {"R"}).values[0],
               (std::vector<float>{165, 166, 166, 167, 167, 168, 168, 169}));
     EXPECT_NE(pack({"stack", b, "-o", both, "--append", first}).err.find("is finished"), std::string::npos);

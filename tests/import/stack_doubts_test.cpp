@@ -121,6 +121,15 @@ TEST(StackDoubts, WhatATransparentFilmMissesStaysASample) {
     EXPECT_TRUE(anyContains(report.notes, "kept as a transparent film's misses"));
 }
 
+TEST(StackDoubts, ACardBeforeNothingIsNoRenderBorder) {
+    const TemporaryFolder folder;
+    const auto card = [](float x, float y) { return x >= 9.2f && x < 30.8f && y >= 5.2f && y < 24.8f; };
+    const auto images = render(folder, 12, false, inside(kTilted, card));
+    const ImportReport report = stackImages(images, folder / "d.exr", {});
+    EXPECT_TRUE(anyContains(report.notes, "kept as a transparent film's misses"));
+    EXPECT_EQ(DumpReader(folder / "d.exr").read(0, 30).samples(), 14400u);
+}
+
 TEST(StackDoubts, TheDepthPassTellsMissesFromWhatWasNotRendered) {
     const TemporaryFolder folder;
     std::vector<std::string> channels = kPasses;
@@ -166,8 +175,10 @@ TEST(StackAppend, SamplesAreAddedAfterThoseOfADump) {
     StackOptions options;
     options.append = folder / "first.exr";
     const ImportReport report = stackImages(more, folder / "both.exr", options);
-    EXPECT_TRUE(anyContains(report.notes, "replicates go on from 2"));
-    EXPECT_FALSE(anyContains(report.notes, "already"));
+    EXPECT_TRUE(anyContains(report.notes, "They are added to the 2 samples a pixel of " + options.append +
+                                              ", which makes 5; replicates go on from 2"));
+    for (const char* said : {"already", "nothing about positions", "Normals are taken"})
+        EXPECT_FALSE(anyContains(report.notes, said)) << said;
     const DumpReader all(folder / "all.exr"), both(folder / "both.exr");
     EXPECT_EQ(both.header().samples, 5.0);
     std::vector<std::string> names;

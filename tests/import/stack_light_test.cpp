@@ -9,6 +9,7 @@
 
 #include <bit>
 #include <cmath>
+#include <filesystem>
 
 #include "../base/temporary_folder.h"
 #include "../dump/test_dumps.h"
@@ -113,6 +114,7 @@ TEST(StackLight, ContributionsAddUpAndPassesAreAveraged) {
     options.passes = folder / "passes.exr";
     options.inputs = "made of";
     const ImportReport report = stackImages(images, folder / "d.exr", options);
+    EXPECT_TRUE(report.ignored.empty());  // the passes' file has what the dump has not
     EXPECT_TRUE(anyContains(report.notes, "Contributions add up to the light"));
     EXPECT_EQ(report.mapped.at("L.Diffuse.G"), "(L.DiffDir.G + L.DiffInd.G) * L.DiffCol.G");
     const SampleBand band =
@@ -162,10 +164,15 @@ TEST(StackLight, PassesOfTheFirstSampleThatNoImageHasAreTold) {
     options.passes = folder / "passes.exr";
     const auto told = [&] {
         const auto images = writeFlat(folder, {values, values});
-        return anyContains(stackImages(images, folder / "d.exr", options).notes,
-                           "no image has anything in Depth: Cycles records");
+        const ImportReport report = stackImages(images, folder / "d.exr", options);
+        EXPECT_FALSE(anyContains(report.notes, "WARNING: no image"));
+        return anyContains(report.notes, "No image has anything in Depth: Cycles records");
     };
     EXPECT_TRUE(told());
+    options.append = folder / "earlier.exr";  // said when that was made, of images that may have had them
+    std::filesystem::copy_file(folder / "d.exr", options.append);
+    EXPECT_FALSE(told());
+    options.append.clear();
     values["L.Depth.Z"] = 3;
     EXPECT_FALSE(told());
 }

@@ -22,7 +22,7 @@ enum class Groups { None, Auto };
 struct StackCommand : ImportCommand {
     std::vector<std::string> mappings, radiance;
     std::vector<std::string> images;
-    std::string append, passes, frames;
+    std::string append, passes, frames, layer;
     StackPreset preset = StackPreset::Auto;
     Groups groups = Groups::None;
     bool keepEmpty = false;
@@ -60,6 +60,7 @@ struct StackCommand : ImportCommand {
             "How channels are named. cycles: Blender's multilayer files with denoising data, and vectors;\n"
             "mitsuba: the aov integrator's; pbrt: the gbuffer film's; plain: R, G, B and a dump's own\n"
             "names; auto: what the names look like");
+        bindLayer(app, layer);
         bindRadiance(app, radiance);
         addChoice(app, "--groups", groups, {{"none", Groups::None}, {"auto", Groups::Auto}},
                   "Of Blender's files, auto: keep all light groups as radiance, and say whether they add up");
@@ -117,12 +118,15 @@ struct StackCommand : ImportCommand {
         options.groups = groups == Groups::Auto;
         options.passes = passes;
         options.append = append;
+        options.layer = layer;
         options.keepEmpty = keepEmpty;
         options.renderer = renderer;
         options.compression = compression;
         options.inputs = inputs;
         const ImportReport report = stackImages(images, dump, options, progress);
-        return print(report, std::to_string(images.size()) + " images");
+        const std::string stacked =
+            std::to_string(images.size()) + (images.size() == 1 ? " image" : " images");
+        return print(report, stacked + (append.empty() ? "" : " added to " + append));
     }
 };
 

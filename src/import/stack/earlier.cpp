@@ -28,9 +28,13 @@ EarlierStack::EarlierStack(const std::string& path, const DumpHeader& added) : r
     firstReplicate_ = freeReplicate(reader_);
 }
 
+double EarlierStack::meanSamples() const {
+    return static_cast<double>(samplesOf(reader_)) / static_cast<double>(reader_.header().data.pixels());
+}
+
 void EarlierStack::enterInto(DumpHeader& header) const {
     const DumpHeader& own = reader_.header();
-    const double before = static_cast<double>(samplesOf(reader_)) / static_cast<double>(own.data.pixels());
+    const double before = meanSamples();
     const double added = header.samples.value_or(0);
     header.averaged = (own.averaged * before + header.averaged * added) / (before + added);
     header.samples = own.samples.value_or(before) + added;
@@ -46,12 +50,19 @@ void EarlierStack::enterInto(DumpHeader& header) const {
     header.extra.erase(kInputsAttribute);
 }
 
-std::vector<std::string> EarlierStack::notes(double averaged) const {
-    const double own = reader_.header().averaged;
-    if (own == averaged) return {};
-    return {"WARNING: samples of " + reader_.path() + " are means of " + formatted("%g", own) +
-            " of the renderer's, those of the images of " + formatted("%g", averaged) +
-            ", but count alike: render images of equally many."};
+std::vector<std::string> EarlierStack::notes(std::size_t images, double averaged) const {
+    const DumpHeader& own = reader_.header();
+    const double before = own.samples.value_or(meanSamples());
+    std::vector<std::string> notes = {"They are added to the " + formatted("%.4g", before) +
+                                      (before == 1 ? " sample" : " samples") + " a pixel of " +
+                                      reader_.path() + ", which makes " +
+                                      formatted("%.4g", before + static_cast<double>(images)) +
+                                      "; replicates go on from " + std::to_string(firstReplicate_) + "."};
+    if (own.averaged != averaged)
+        notes.push_back("WARNING: samples of " + reader_.path() + " are means of " +
+                        formatted("%g", own.averaged) + " of the renderer's, those of the images of " +
+                        formatted("%g", averaged) + ", but count alike: render images of equally many.");
+    return notes;
 }
 
 }  // namespace vlx

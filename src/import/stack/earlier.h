@@ -19,10 +19,13 @@ class EarlierStack {
     const DumpReader& samples() const { return reader_; }
     std::uint32_t firstReplicate() const { return firstReplicate_; }
 
-    /// Whether its samples are means of as many of the renderer's as those of the images.
-    std::vector<std::string> notes(double averaged) const;
+    /// What the dump has now with those of `images` images, and whether its samples are means of as many of
+    /// the renderer's as theirs, `averaged`.
+    std::vector<std::string> notes(std::size_t images, double averaged) const;
 
   private:
+    double meanSamples() const;  // of a pixel
+
     DumpReader reader_;
     std::uint32_t firstReplicate_ = 0;
 };

@@ -252,11 +252,12 @@ void PassFile::close() {
     impl_->file.commit();
 }
 
-std::vector<std::string> PassFile::notes() const {
+std::vector<std::string> PassFile::notes(bool added) const {
     std::vector<std::string> notes;
     if (impl_->crowded > 0)
         notes.push_back(std::to_string(impl_->crowded) +
                         " pixels have more cryptomatte ids than the file has ranks: the least are left out.");
+    if (added) return notes;
     Names ofFirst;
     bool found = false;
     for (const Plane& plane : impl_->planes) {
@@ -265,9 +266,9 @@ std::vector<std::string> PassFile::notes() const {
         if (!contains(ofFirst, passOf(plane.name))) ofFirst.push_back(passOf(plane.name));
     }
     if (!ofFirst.empty() && !found)
-        notes.push_back("WARNING: no image has anything in " + listed(ofFirst) +
-                        ": Cycles records these passes of sample 0 alone. Give the first image the sample "
-                        "offset 0 (image i, from 0: i * samples).");
+        notes.push_back("No image has anything in " + listed(ofFirst) +
+                        ": Cycles records these passes of its sample 0 alone, which none of the images has. "
+                        "To have them, render image i (from 0) from the sample offset i * samples.");
     return notes;
 }
 

@@ -27,8 +27,8 @@ class PassFile {
     /// Gives the file its name. Throws Error.
     void close();
 
-    /// What could not be kept, and passes that no image has.
-    std::vector<std::string> notes() const;
+    /// What could not be kept, and passes that no image has; `added`: to earlier images, which may have them.
+    std::vector<std::string> notes(bool added) const;
 
   private:
     struct Impl;

@@ -24,6 +24,13 @@ bool takeNoisyImage(ChannelMap& map, const Names& names, const std::string& laye
     return taken;
 }
 
+// "L." of Blender's files: of the layer that --layer names, else of the first one that has Combined.
+std::optional<std::string> blenderLayer(const std::string& path, const Names& names,
+                                        const std::string& wanted) {
+    const auto first = cyclesLayer(names);
+    return first && !wanted.empty() ? layerPrefix(namedLayer(path, names, wanted).front()) : first;
+}
+
 // The dump's channels, motion whole or not at all: readers ask for all of it.
 std::vector<DumpChannel> stackChannels(const ChannelMap& map) {
     std::vector<DumpChannel> channels = dumpChannels(map, true);
@@ -41,7 +48,7 @@ StackPlan planStack(const std::string& path, const Names& names, const StackOpti
     const bool byLight = options.groups || !options.passes.empty();
     StackPlan plan;
     if (byLight) {
-        const auto layer = cyclesLayer(names);
+        const auto layer = blenderLayer(path, names, options.layer);
         const bool cycles = options.preset == StackPreset::Cycles || options.preset == StackPreset::Auto;
         if (!layer || !cycles)
             throw Error(
@@ -59,7 +66,7 @@ StackPlan planStack(const std::string& path, const Names& names, const StackOpti
     plan.mapped = chosen.map;
     plan.radiance = all.radiance;
     if (plan.preset == StackPreset::Cycles) {
-        plan.layer = *cyclesLayer(names);
+        plan.layer = blenderLayer(path, names, options.layer).value_or("");
         plan.noisyImage = takeNoisyImage(plan.mapped, names, plan.layer);
     }
     std::map<std::string, Recipe> made;

@@ -18,7 +18,7 @@ struct StackChannel {
 /// What a stack's dump holds, and what that is of the images.
 struct StackPlan {
     StackPreset preset = StackPreset::Plain;
-    std::string layer;  ///< of Cycles: "L."
+    std::string layer;  ///< of Cycles: "L.", that of --layer or the first one
     ChannelMap mapped;  ///< for the report
     std::vector<StackChannel> channels;
     Names groups;                             ///< light groups that are kept as radiance

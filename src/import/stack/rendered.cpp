@@ -19,6 +19,7 @@ class Extent {
         for (const char* name :
              {"R", "G", "B", "A", "Z", "albedo.R", "albedo.G", "albedo.B", "N.X", "N.Y", "N.Z"})
             if (const auto source = plan.mapped.find(name); source != plan.mapped.end()) {
+                if (name == std::string("A")) alpha_ = channels_.size();
                 channels_.push_back(takeFromAll(images_, {{source->second}, {}}));
                 taken += images_.size();
             }
@@ -34,20 +35,29 @@ class Extent {
         return true;
     }
 
-    // The rectangle that the pixels which are not 0 fill; nothing if they do not fill one.
+    // The rectangle that the pixels which are not 0 fill; nothing if they do not fill one, or if a side of it
+    // is the edge of a thing: pixels that it covers in part. A border cuts through what is as opaque as
+    // elsewhere.
     std::optional<Window> rectangle() {
         const Window w = images_.data();
         int left = w.width, right = 0, top = w.height, bottom = 0;
         std::int64_t full = 0;
+        std::vector<int> softOfRow(static_cast<std::size_t>(w.height)),
+            softOfColumn(static_cast<std::size_t>(w.width));
         for (int row = 0; row < w.height;) {
             const int rows = std::min(rows_, w.height - row);
             images_.read(w.y + row, rows);
             for (int r = 0; r < rows; ++r)
                 for (int col = 0; col < w.width; ++col) {
-                    if (isEmpty(static_cast<std::size_t>(r) * static_cast<std::size_t>(w.width) +
-                                static_cast<std::size_t>(col)))
-                        continue;
+                    const std::size_t pixel =
+                        static_cast<std::size_t>(r) * static_cast<std::size_t>(w.width) +
+                        static_cast<std::size_t>(col);
+                    if (isEmpty(pixel)) continue;
                     ++full;
+                    if (isSoft(pixel)) {
+                        ++softOfRow[static_cast<std::size_t>(row + r)];
+                        ++softOfColumn[static_cast<std::size_t>(col)];
+                    }
                     left = std::min(left, col);
                     right = std::max(right, col + 1);
                     top = std::min(top, row + r);
@@ -56,10 +66,23 @@ class Extent {
             row += rows;
         }
         if (full == 0 || full != std::int64_t{right - left} * (bottom - top)) return std::nullopt;
+        const auto isEdge = [](const std::vector<int>& soft, int at, int length) {
+            return 2 * soft[static_cast<std::size_t>(at)] > length;
+        };
+        if ((top > 0 && isEdge(softOfRow, top, right - left)) ||
+            (bottom < w.height && isEdge(softOfRow, bottom - 1, right - left)) ||
+            (left > 0 && isEdge(softOfColumn, left, bottom - top)) ||
+            (right < w.width && isEdge(softOfColumn, right - 1, bottom - top)))
+            return std::nullopt;
         return Window{w.x + left, w.y + top, right - left, bottom - top};
     }
 
   private:
+    bool isSoft(std::size_t pixel) const {
+        return std::ranges::any_of(channels_[alpha_],
+                                   [&](const Mixture& ofImage) { return ofImage.value(images_, pixel) < 1; });
+    }
+
     bool isEmpty(std::size_t pixel) const {
         for (const auto& channel : channels_)
             for (const Mixture& ofImage : channel)
@@ -69,6 +92,7 @@ class Extent {
 
     FlatImages images_;
     std::vector<std::vector<Mixture>> channels_;
+    std::size_t alpha_ = 0;  // among them
     int rows_ = 1;
 };
 

@@ -14,7 +14,7 @@ namespace vlx {
 ///
 /// The pass Depth tells them apart: Blender fills it with 1e11, Cycles writes 1e10 for a miss (3.4, looked
 /// at). Without it the pixels that are 0 in colour, alpha and all features of all images were not rendered if
-/// the others fill a rectangle: those of a transparent film do not.
+/// the others fill a rectangle whose sides are no edges: those of a transparent film do not.
 class RenderedPixels {
   public:
     /// Takes the depth from the images, or looks through them once more where their corners are 0.

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace vlx::render {
@@ -67,5 +68,14 @@ class EffectSet {
   private:
     std::bitset<kEffects> bits_;
 };
+
+/// What the person asks for: what the scene calls for, less some effects, or everything.
+struct EffectRequest {
+    bool all = false;
+    EffectSet without;
+};
+
+/// Reads "auto", "all", or "auto,-NAME,-NAME...". Nothing, with the fault in `broken`, when it is neither.
+std::optional<EffectRequest> parseEffects(std::string_view text, std::string& broken);
 
 }  // namespace vlx::render

@@ -4,7 +4,6 @@
 
 #include "render/plan/material_range.h"
 #include "render/plan/reach.h"
-#include "variolux/base/text.h"
 
 namespace vlx::render {
 namespace {
@@ -341,25 +340,6 @@ class Analysis {
 };
 
 }  // namespace
-
-std::optional<EffectRequest> parseEffects(std::string_view text, std::string& broken) {
-    EffectRequest request;
-    bool first = true;
-    for (const std::string& words : split(text, ',')) {
-        const std::string_view word = words;
-        if (first && (word == "auto" || word == "all")) {
-            request.all = word == "all";
-        } else if (!first && !request.all && word.starts_with('-') && effectNamed(word.substr(1))) {
-            request.without.set(*effectNamed(word.substr(1)));
-        } else {
-            broken =
-                "expected auto, all, or auto,-NAME with an effect's name, found '" + std::string(word) + "'";
-            return std::nullopt;
-        }
-        first = false;
-    }
-    return request;
-}
 
 bool Plan::lit() const {
     return std::ranges::any_of(kLightEffects, [&](Effect e) { return of(e).called && of(e).planned; });

@@ -11,15 +11,6 @@
 
 namespace vlx::render {
 
-/// What the person asks for: what the scene calls for, less some effects, or everything.
-struct EffectRequest {
-    bool all = false;
-    EffectSet without;
-};
-
-/// Reads "auto", "all", or "auto,-NAME,-NAME...". Nothing, with the fault in `broken`, when it is neither.
-std::optional<EffectRequest> parseEffects(std::string_view text, std::string& broken);
-
 /// The picture that is planned for.
 struct PlanOptions {
     std::size_t camera = 0;

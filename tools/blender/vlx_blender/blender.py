@@ -35,6 +35,7 @@ class Blender:
         self.scene, self.children, self.sampled = scene, children, sampled
         self.said = collections.deque(maxlen=200)  # Blender's last lines
         self.unwritten = ""  # what it says of a file that it could not write, and finishes all the same
+        self.named = False  # it has said that it is Blender
         self.heard = threading.Semaphore(0)  # all that it said of an image
         found = shutil.which(program)
         if not found:
@@ -64,8 +65,10 @@ class Blender:
     def answer(self):
         for line in self.process.stdout:
             if not line.startswith("vlx "):
+                self.named = self.named or line.startswith("Blender ")
                 self.said.append(line.rstrip())
                 continue
+            self.named = True
             values = json.loads(line[4:])
             if "error" in values:
                 self.fail(re.sub(r"^Error: ", "", values["error"]))
@@ -73,6 +76,9 @@ class Blender:
         code = self.process.wait()
         self.listener.join(2)
         self.children.done(self.process)
+        if code >= 0 and not self.named:
+            raise Failure("\n".join([f"{self.program}: expected Blender 3.4 or later, found a program that ended (exit code {code}) without "
+                                     "a word of Blender's (--blender PATH)", *(f"  it said: {line}" for line in [*self.said][-3:])]))
         self.fail(f"Blender was ended by signal {-code}" if code < 0 else f"Blender ended (exit code {code})")
 
     def fail(self, what):

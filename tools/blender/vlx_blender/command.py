@@ -3,6 +3,7 @@
 import argparse
 import os
 import pathlib
+import shlex
 import shutil
 import signal
 import sys
@@ -10,14 +11,16 @@ import tempfile
 
 from . import finished, frames, manual
 from .blender import Blender, check_scene_file
-from .log import BAD_USAGE, DONE, FAILED, PASSED, Failure, Log, Usage
+from .claim import FOLDER, claim
+from .log import BAD_USAGE, DONE, FAILED, PASSED, Failure, Log, Usage, counted
 from .processes import Children, Programs
-from .shot import Options, Shot, kept_name
+from .shot import Options, Shot, kept_name, named
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 OWN = {"-o", "--output", "--template", "--drop-layers", "--frames", "--temporal", "--radiance", "--json", "--log", "--overwrite",
        "-q", "--quiet", "--threads"}  # of vlx-krige's options those that are set here
-WITHOUT = {"--band", "--scale", "--max-memory", "--assess"}  # and those that go without the layers of Blender's file
+WITHOUT = {"--band", "--scale", "--max-memory", "--assess", "--diagnostics"}  # those that go without the layers of Blender's file
+FLAT = {"--preset", "--variance-is", "--variance-of", "--variance", "--albedo", "--normal", "--depth", "--samples"}  # of flat images
 
 DESCRIPTION = """Renders a Blender file with Cycles, takes out the noise by kriging, and says how accurate each picture is.
 One Blender in the background renders every frame as a few images of a few samples; each frame is packed and kriged while the next one
@@ -36,8 +39,10 @@ stamps, stereo, compositor and sequencer; on are denoising data. All else is the
 scene's own.
 
 Exit codes: 0 done; 1 failure at run time (a file, the disk, Blender); 2 bad
-usage; 3 a frame's error stayed above --target-error. Ended by a signal, it
-leaves no unfinished files, and Blender ends with it."""
+usage; 3 a frame's error stayed above --target-error. Ended by a signal (Ctrl-C,
+SIGTERM, SIGHUP), it leaves no unfinished files, and Blender ends with it. To end
+a job in the background use kill (SIGTERM): scripts start what has an & behind it
+with Ctrl-C's signal, SIGINT, switched off."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -78,7 +83,7 @@ def parser():
     add("--temporal", type=whole(0, 8), default=0, metavar="N", help="Data of N frames before and N after add to each frame, moved by Blender's motion vectors. Best without motion blur, with which Blender writes none")
     add("--engine", choices=["CYCLES"], help="Render with Cycles a file that is set to another engine, which is else refused")
     add("--view-layer", metavar="NAME", help="The view layer to render (default: the first one that is rendered)")
-    add("--keep-samples", metavar="FOLDER", help="Keep the samples of each frame there, as samples_OUTPUT, for vlx-krige")
+    add("--keep-samples", metavar="FOLDER", help="Keep the samples of each frame in this folder, which is made if need be, as samples_OUTPUT, for vlx-krige")
     add("--blender", metavar="PATH", default="blender", help="Blender's program")
     add("--threads", type=whole(0, 1024), default=0, metavar="N", help="Of Blender and of vlx-krige, which run at the same time. 0: all processors")
     add("--overwrite", action="store_true", help="Render frames even if their pictures are there and were made by these programs from the same file with the same options, which are else skipped. Textures and linked files are not looked at")
@@ -101,16 +106,35 @@ def check(o, krige):
             raise Usage(f"{name}: expected before --, or not at all: vlx-blender gives it to vlx-krige itself")
         if name in WITHOUT:
             raise Usage(f"{name}: goes without the layers of Blender's file, which pictures keep: use --keep-samples, then vlx-krige")
+        if name in FLAT:
+            raise Usage(f"{name}: goes with a flat image that has a variance; here samples are kriged")
     if o.temporal and not frames.has_place(o.output):
         raise Usage("--temporal goes with #### in --output: frames add to each other")
     if o.temporal and o.target_error:
-        raise Usage("--target-error goes without --temporal: a frame's error would depend on its neighbours' samples")
+        raise Usage("--target-error goes without --temporal: how good a frame is would depend on how many images its neighbours get. "
+                    "Take one of them; with --temporal choose --images for the whole shot")
+    if o.frames:
+        check_frames(o, frames.parse(o.frames))
+    if not frames.has_place(o.output):
+        check_place(o.output)
     if o.max_images < o.images:
         raise Usage(f"--max-images: expected at least --images, {o.images}, found {o.max_images}")
     check_scene_file(o.scene)
-    for option, folder in (("--output", os.path.dirname(o.output) or "."), ("--keep-samples", o.keep_samples)):
-        if folder and not os.path.isdir(folder):
-            raise Failure(f"{option}: expected the folder '{folder}', found none")
+    folder = os.path.dirname(o.output) or "."
+    if not os.path.isdir(folder):
+        raise Failure(f"--output: expected the folder '{folder}', found none")
+
+
+def check_place(picture):
+    if os.path.isdir(picture):
+        raise Failure(f"{picture}: expected a place for a picture, found a folder")
+
+
+def check_frames(o, chosen):
+    if len(chosen) > 1 and not frames.has_place(o.output):
+        raise Usage(f"--output: expected #### for the number of each of {len(chosen)} frames, found '{o.output}'")
+    if o.temporal and len(chosen) > 1 and not any(f + 1 in chosen for f in chosen):
+        raise Usage("--temporal: expected frames that follow each other, found none with a neighbour")
 
 
 def check_about(about, o, log):
@@ -132,8 +156,9 @@ def check_about(about, o, log):
         log.warn(f"WARNING: {scene} was saved by Blender {'.'.join(map(str, about['fileVersion'][:2]))}, newer than {about['blender']}: "
                  "what that does not know is lost (--blender PATH)")
     if about["missing"]:
-        log.warn(f"WARNING: {scene} names {len(about['missing'])} files that are not there: " + ", ".join(about["missing"][:10]) +
-                 (", ..." if len(about["missing"]) > 10 else ""))
+        missing = about["missing"]
+        log.warn(f"WARNING: {scene} names {counted(len(missing), 'file')} that {'is' if len(missing) == 1 else 'are'} not there: " +
+                 ", ".join(missing[:10]) + (", ..." if len(missing) > 10 else ""))
     if about["scenes"] > 1 or (len(about["layers"]) > 1 and not o.view_layer):
         log.say(f"rendered is the scene '{about['scene']}', view layer '{about['layer']}' (--view-layer; the scene is the one that was "
                 "active when the file was saved)")
@@ -146,27 +171,33 @@ def check_about(about, o, log):
                  "where things move")
 
 
-def check_krige_options(shot, programs):
-    """Bad usage is found now, not after the first frame: there is no dump yet, so nothing is kriged."""
-    code, _, _, failure = programs.run("vlx-krige", *shot.krige_arguments([0]), "--log", "json")
+def check_krige_options(o, krige, programs, temporary):
+    """Bad usage is found now, not after the first frame: there is no dump, so nothing is kriged."""
+    none = os.path.join(temporary, "none_####.exr")
+    temporal = ["--temporal", str(o.temporal)] if o.temporal else []
+    code, _, _, failure = programs.run("vlx-krige", none, "-o", os.path.join(temporary, "kriged_####.exr"), "--template", none,
+                                       "--frames", "0", *temporal, *krige, "--log", "json")
     if code == BAD_USAGE:
         raise Usage(f"options of vlx-krige: {failure.removeprefix('vlx-krige: ').split(chr(10))[0]}")
+    if code == DONE:
+        raise Usage("options of vlx-krige: expected those of kriging, found one that only prints something (vlx-krige --help)")
+    for command in (value for name, value in named(krige) if name == "--denoiser"):
+        program = "oidnDenoise" if command == "oidn" else shlex.split(command)[0]
+        if not shutil.which(program):
+            raise Failure(f"--denoiser: expected the program {program} in PATH, found none")
 
 
 def chosen_frames(o, about):
     if o.frames:
-        chosen = frames.parse(o.frames)
-    elif frames.has_place(o.output):
+        return frames.parse(o.frames)
+    if frames.has_place(o.output):
         first, last, step = about["frames"]
         chosen = list(range(first, last + 1, step))
     else:
         chosen = [about["frame"]]
-    if len(chosen) > 1 and not frames.has_place(o.output):
-        raise Usage(f"--output: expected #### for the number of each of {len(chosen)} frames, found '{o.output}'")
     if not chosen or chosen[0] < 0:
         raise Failure(f"{o.scene}: expected frames from 0, found {about['frames'][0]} to {about['frames'][1]} (--frames)")
-    if o.temporal and len(chosen) > 1 and not any(f + 1 in chosen for f in chosen):
-        raise Usage("--temporal: expected frames that follow each other, found none with a neighbour")
+    check_frames(o, chosen)
     return chosen
 
 
@@ -181,24 +212,38 @@ def notes_of(o, krige, about, shot, programs):
 def run(o, krige, folders, log, children):
     check(o, krige)
     programs = Programs(folders, children)
-    temporary = tempfile.mkdtemp(prefix=".vlx-blender-", dir=os.path.dirname(o.output) or ".")
+    hidden = []
     try:
-        return render(o, krige, programs, log, children, os.path.abspath(temporary))
+        temporary, keeping = (hidden_folder(folder, hidden) if folder else ""
+                              for folder in (os.path.dirname(o.output) or ".", o.keep_samples))
+        check_krige_options(o, krige, programs, temporary)
+        return render(o, krige, programs, log, children, temporary, keeping)
     finally:
         for number in SIGNALS:  # a second Ctrl-C must not keep the rest
             signal.signal(number, signal.SIG_IGN)
         children.end()
-        shutil.rmtree(temporary, ignore_errors=True)
+        for folder in hidden:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
-def render(o, krige, programs, log, children, temporary):
+def hidden_folder(place, hidden):
+    """For what is not complete; entered into `hidden`."""
+    try:
+        os.makedirs(place, exist_ok=True)
+        hidden.append(os.path.abspath(tempfile.mkdtemp(prefix=FOLDER, dir=place)))
+    except OSError as error:
+        raise Failure(f"{place}: expected a folder that can be written into: {error.strerror}") from None
+    return hidden[-1]
+
+
+def render(o, krige, programs, log, children, temporary, keeping):
     shot = None
     wish = {"samples": o.spp, "viewLayer": o.view_layer, "vectors": o.temporal > 0}
     blender = Blender(o.blender, o.scene, wish, children, temporary, o.threads, lambda part: shot and shot.sampled(part))
     about = blender.about
     check_about(about, o, log)
     chosen = chosen_frames(o, about)
-    options = Options(o.output, o.images, o.spp, o.temporal, o.target_error or 0.0, o.max_images, o.keep_samples or "",
+    options = Options(o.output, o.images, o.spp, o.temporal, o.target_error or 0.0, o.max_images, o.keep_samples or "", keeping,
                       [*krige, *(["--threads", str(o.threads)] if o.threads else [])], about["firstSample"])
     notes = notes_of(o, krige, about, chosen, programs)
 
@@ -207,6 +252,12 @@ def render(o, krige, programs, log, children, temporary):
         return kept and not o.overwrite and finished.note(frames.name_of(o.output, frame)) == notes[frame]
 
     wanted = [frame for frame in chosen if not is_finished(frame)]
+    pictures = [frames.name_of(o.output, frame) for frame in wanted]
+    for picture in pictures:
+        check_place(picture)
+    if wanted:
+        taken = claim(temporary, pictures)  # until it is closed, with the run
+        wanted = [frame for frame in wanted if not is_finished(frame)]  # meanwhile, by another run
     for frame in chosen:
         if frame not in wanted:
             output = frames.name_of(o.output, frame)
@@ -215,9 +266,9 @@ def render(o, krige, programs, log, children, temporary):
     if not wanted:
         return DONE
     shot = Shot(options, chosen, wanted, notes, blender, programs, log, temporary)
-    check_krige_options(shot, programs)
     shot.run()
     blender.close()
+    taken.close()
     return PASSED if shot.missed else DONE
 
 

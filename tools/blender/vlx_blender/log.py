@@ -19,6 +19,11 @@ class Usage(Exception):
     """The command line: exit code 2."""
 
 
+def counted(number, thing):
+    """1 file, 2 files."""
+    return f"{number} {thing}" + ("" if number == 1 else "s")
+
+
 def duration(seconds):
     """12 s, 3 min 05 s, 2 h 07 min."""
     whole = math.ceil(max(seconds, 0))

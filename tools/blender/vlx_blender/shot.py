@@ -14,7 +14,6 @@ from .log import Failure
 
 AHEAD = 2            # frames that may wait for kriging, so that the disk does not fill with them
 ERROR_FALLS = 0.6    # as samples ** -0.6, measured over scenes
-OPINIONS = ("--denoiser", "--denoised")  # options of vlx-krige that go without --radiance
 MOST_AT_ONCE = 3     # times as many images as there are, in one step towards the wanted error
 
 
@@ -27,6 +26,7 @@ class Options:
     target: float           # 0: none
     most_images: int
     keep: str               # a folder for dumps, or empty
+    keeping: str            # a hidden folder there, for what is not complete
     krige: list             # options of vlx-krige
     first_sample: int       # number of the first image's first sample
 
@@ -162,7 +162,7 @@ class Shot:
         images = [self.image(frame.number, i) for i in range(frame.images)]
         dump, passes = (frames.name_of(name, frame.number) for name in (self.dumps(), self.templates()))
         report = self.ran("vlx-pack", "stack", *images, "-o", dump, "--overwrite", "--preset", "cycles", "--groups", "auto",
-                          "--passes", passes)
+                          "--passes", passes, "--keep-empty")  # there is no border: all pixels are rendered
         for line in report.splitlines():
             if line.strip().startswith("For vlx-krige:"):
                 self.radiance = shlex.split(line.split(":", 1)[1])
@@ -175,12 +175,11 @@ class Shot:
         return [f for f, window in self.windows.items() if not self.frames[f].kriged and all(self.frames[i].packed for i in window)]
 
     def krige_arguments(self, numbers):
-        options = [*self.radiance]
-        if any(word.split("=")[0] in OPINIONS for word in self.options.krige):
-            options = []
-            if self.radiance:
-                self.warn("WARNING: with another denoiser's image light groups and contributions are the samples' mean, as noisy as "
-                          "that: they would not add up to the picture")
+        without = radiance_goes_not_with(self.options.krige)
+        options = [] if without else [*self.radiance]
+        if without and self.radiance:
+            self.warn(f"WARNING: with {without} light groups and contributions are the samples' mean, as noisy as that, and may not "
+                      "add up to the picture")
         if self.options.temporal:
             options += ["--temporal", str(self.options.temporal)]
         return [self.dumps(), "-o", self.pictures(), "--template", self.templates(), "--frames", ",".join(map(str, numbers)),
@@ -244,8 +243,12 @@ class Shot:
                 continue
             if self.options.keep:
                 kept = frames.name_of(kept_name(self.options), frame.number)
-                shutil.move(dump, kept + ".part")
-                os.replace(kept + ".part", kept)
+                part = os.path.join(self.options.keeping, os.path.basename(kept))
+                try:
+                    shutil.move(dump, part)
+                    os.replace(part, kept)
+                except OSError as error:
+                    raise Failure(f"{kept}: cannot be written: {error.strerror}") from None
             self.remove([dump, frames.name_of(self.templates(), frame.number)])
 
     @staticmethod
@@ -267,8 +270,26 @@ class Shot:
         for message in [*messages, *warnings]:
             self.warn(message.replace(self.temporary + os.sep, ""))
         if code != 0:
-            raise Failure(failure.replace(self.temporary + os.sep, "") or f"{program} ended with exit code {code}")
+            what = failure.replace(self.temporary + os.sep, "") or f"{program} ended with exit code {code}"
+            raise Failure(f"{self.options.output}: {what}")
         return out
+
+
+def named(krige):
+    """vlx-krige's options with their values."""
+    for word, value in zip(krige, [*krige[1:], ""]):
+        name, _, own = word.partition("=")
+        yield name, own or value
+
+
+def radiance_goes_not_with(krige):
+    """Which of vlx-krige's options it is that --radiance goes without; empty: none."""
+    for name, value in named(krige):
+        if name in ("--denoiser", "--denoised"):
+            return name
+        if name == "--method" and value != "krige":
+            return f"--method {value}"
+    return ""
 
 
 def kept_name(options):
