@@ -96,9 +96,7 @@ struct Walk {
 
     template <Features F>
     SurfaceParameters parameters(const SurfacePoint& point) const {
-        SurfaceParameters surface = parametersAt<F>(in.scene, point);
-        if constexpr (F.rare) surface.leftOut = in.options.leftOut;
-        return surface;
+        return parametersAt<F>(in.scene, point, in.plain(*point.material));
     }
 
     /// Goes on behind the surface as if it were not there.

@@ -152,8 +152,28 @@ SurfacePoint surfaceAt(const Scene& scene, const Hit& hit, const Vec3& rayDirect
     return surfacePoint<kEveryFeature>(scene, hit, rayDirection, time);
 }
 
+SurfaceParameters plainParameters(const Scene& scene, const Material& m) {
+    SurfaceParameters s;
+    s.baseColour = m.baseColour;
+    s.metallic = m.metallic;
+    s.roughness = m.roughness;
+    s.retro = m.retro;
+    s.transmission = m.transmission;
+    s.ior = m.ior;
+    s.specular = m.specular;
+    s.specularColour = m.specularColour;
+    s.clearcoat = m.clearcoat;
+    s.clearcoatRoughness = m.clearcoatRoughness;
+    s.sheenColour = m.sheenColour;
+    s.sheenRoughness = m.sheenRoughness;
+    if (!isBlack(m.sheenColour)) s.sheenTable = scene.sheenTables.data();
+    s.albedoTable = &scene.albedoTables[static_cast<std::size_t>(m.albedoTable)];
+    if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
+    return s;
+}
+
 SurfaceParameters surfaceParameters(const Scene& scene, const SurfacePoint& point) {
-    return parametersAt<kEveryFeature>(scene, point);
+    return parametersAt<kEveryFeature>(scene, point, plainParameters(scene, *point.material));
 }
 
 }  // namespace vlx::render

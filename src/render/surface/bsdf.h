@@ -15,7 +15,7 @@ Rgb BasicBsdf<F>::baseFresnel(float cosH) const {
     Rgb f;
     if (metal_ > 0) f += lerp(metalF0_, Rgb(1), schlickWeight(cosH)) * metal_;
     if (opaque_ > 0)
-        f += lerp(dielectricF0_, Rgb(dielectricF90_), dielectricWeight(cosH, ior_, exactF0_)) * opaque_;
+        f += lerp(layer_.f0, Rgb(layer_.f90), dielectricWeight(cosH, ior_, layer_.exactF0)) * opaque_;
     return f * base_;
 }
 
@@ -27,7 +27,7 @@ float BasicBsdf<F>::coatFresnel(float cosH) const {
 template <Features F>
 typename BasicBsdf<F>::GlassSplit BasicBsdf<F>::splitAt(float cosH) const {
     const float exact = dielectricFresnel(cosH, eta_);
-    const Rgb r = lerp(dielectricF0_, Rgb(dielectricF90_), dielectricWeight(cosH, eta_, exactF0_));
+    const Rgb r = lerp(layer_.f0, Rgb(layer_.f90), dielectricWeight(cosH, eta_, layer_.exactF0));
     const Rgb t = exact < 1 ? (Rgb(1) - r) * glassTint_ : Rgb(0);
     const float toReflect = maxComponent(r), toTransmit = maxComponent(t);
     const float total = toReflect + toTransmit;
@@ -76,8 +76,8 @@ BsdfValue BasicBsdf<F>::diffuse(const Vec3& wi) const {
     const bool retro = retroRoughness_ >= 0;
     const Rgb body = retro ? diffuse_ * retroFactor(wi) : diffuse_;
     if constexpr (!F.reflection) return {body * pdf, pdf};
-    const Albedo atI = row_.at(wi.z);
-    const Rgb entering = retro ? Rgb(1) : Rgb(1) - dielectricAlbedo(atI);
+    const Albedo atI = layer_.row.at(wi.z);
+    const Rgb entering = retro ? Rgb(1) : Rgb(1) - layer_.albedo(atI);
     const Rgb f = body * entering + multiple_ * (1 - atI.whole);
     return {f * pdf, pdf};
 }

@@ -26,11 +26,21 @@ inline Rgb multipleColour(const Rgb& meanReflectance, float meanWhole) {
 inline float inverseRest(float x) { return 1 / std::max(1 - x, 1e-4f); }
 inline Rgb inverseRest(const Rgb& c) { return {inverseRest(c.x), inverseRest(c.y), inverseRest(c.z)}; }
 
+inline DielectricLayer::DielectricLayer(const SurfaceParameters& s)
+    : row(s.albedoTable->row(s.roughness)),
+      exactF0(normalReflectance(s.ior)),
+      f0(minimum(s.specularColour * exactF0, 1.f) * s.specular),
+      f90(s.specular),
+      multiple(multipleColour(lerp(f0, Rgb(f90), s.albedoTable->meanWeight()), row.mean().whole)),
+      mean(albedo(row.mean())),
+      rest(inverseRest(mean)) {}
+
 template <Features F>
 BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromInside,
                         const AlbedoTable& coatTable, const Vec3& trueNormal)
     : wo_(wo),
       up_(trueNormal),
+      layer_(layerOf(s)),
       alpha_(square(s.roughness)),
       coatAlpha_(square(s.clearcoatRoughness)),
       retroRoughness_(s.retro ? s.roughness : -1),
@@ -41,9 +51,7 @@ BasicBsdf<F>::BasicBsdf(const SurfaceParameters& s, const Vec3& wo, bool fromIns
       metalF0_(s.baseColour),
       glassTint_(s.baseColour),
       ior_(s.ior),
-      eta_(fromInside ? 1 / s.ior : s.ior),
-      exactF0_(normalReflectance(s.ior)),
-      row_(s.albedoTable->row(s.roughness)) {
+      eta_(fromInside ? 1 / s.ior : s.ior) {
     const float cosO = wo.z;
     if (F.layers && coat_ > 0) {
         countEffect(Effect::Clearcoat);
@@ -95,23 +103,20 @@ template <Features F>
 void BasicBsdf<F>::setReflecting(const SurfaceParameters& s, bool fromInside, float glass,
                                  float sheenEnergy) {
     const float cosO = wo_.z;
-    dielectricF0_ = minimum(s.specularColour * exactF0_, 1.f) * s.specular;
-    dielectricF90_ = s.specular;
-
-    const Albedo atO = row_.at(cosO);
-    const Albedo& mean = row_.mean();
-    const Rgb dielectricMean = lerp(dielectricF0_, Rgb(dielectricF90_), s.albedoTable->meanWeight());
-    const Rgb metalMean = lerp(metalF0_, Rgb(1), 1.f / 21.f);  // of Schlick's curve
-    dielectricMultiple_ = multipleColour(dielectricMean, mean.whole);
-    const Rgb again = (multipleColour(metalMean, mean.whole) * metal_ + dielectricMultiple_ * opaque_) *
-                      ((1 - atO.whole) * base_);
-    multiple_ = again * inverseRest(mean.whole);
-    const Rgb entering = Rgb(1) - dielectricAlbedo(atO);
-    const Rgb meanDielectric = dielectricAlbedo(mean);
-    const Rgb rest = inverseRest(meanDielectric);
-    const Rgb body = (s.retro ? minimum(s.baseColour, 1.f) : minimum(s.baseColour * rest, 1.f) * entering) *
-                     (opaque_ * base_);
-    diffuse_ = s.retro ? body : body * rest;
+    const Albedo atO = layer_.row.at(cosO);
+    const float meanWhole = layer_.row.mean().whole;
+    Rgb colour = layer_.multiple * opaque_;
+    if (metal_ > 0) {
+        const Rgb metalMean = lerp(metalF0_, Rgb(1), 1.f / 21.f);  // of Schlick's curve
+        colour = multipleColour(metalMean, meanWhole) * metal_ + colour;
+    }
+    const Rgb again = colour * ((1 - atO.whole) * base_);
+    multiple_ = again * inverseRest(meanWhole);
+    const Rgb entering = Rgb(1) - layer_.albedo(atO);
+    const Rgb body =
+        (s.retro ? minimum(s.baseColour, 1.f) : minimum(s.baseColour * layer_.rest, 1.f) * entering) *
+        (opaque_ * base_);
+    diffuse_ = s.retro ? body : body * layer_.rest;
 
     // Smooth glass without a change of index neither bends nor spreads light.
     glassSmooth_ = smooth_ || std::abs(eta_ - 1) < 1e-3f;
@@ -120,10 +125,10 @@ void BasicBsdf<F>::setReflecting(const SurfaceParameters& s, bool fromInside, fl
         glassWeight_ /= std::max(0.05f, s.glassTable->kept(cosO, s.roughness, fromInside));
 
     // Energy of each lobe towards wo: the probability of choosing it.
-    const Rgb metalSingle = metalF0_ * (atO.whole - atO.conductor) + Rgb(atO.conductor);
-    const Rgb dielectricSingle =
-        dielectricF0_ * (atO.whole - atO.dielectric) + Rgb(dielectricF90_ * atO.dielectric);
-    const Rgb single = (metalSingle * metal_ + dielectricSingle * opaque_) * base_;
+    const Rgb dielectricSingle = layer_.f0 * (atO.whole - atO.dielectric) + Rgb(layer_.f90 * atO.dielectric);
+    Rgb single = dielectricSingle * opaque_;
+    if (metal_ > 0) single = (metalF0_ * (atO.whole - atO.conductor) + Rgb(atO.conductor)) * metal_ + single;
+    single *= base_;
     const Rgb spread = body + again;
     Rgb through;
     if (F.glass && glass > 0) {
@@ -142,21 +147,12 @@ void BasicBsdf<F>::leaveAbove() {
     if constexpr (!F.reflection) {
         diffuse_ *= whole;
     } else {
-        const Albedo& mean = row_.mean();
-        const Albedo above = row_.meanAbove(up_.z);
-        const Rgb entering = retroRoughness_ < 0
-                                 ? (Rgb(1) - dielectricAlbedo(mean)) * inverseRest(dielectricAlbedo(above))
-                                 : Rgb(1);
+        const Albedo above = layer_.row.meanAbove(up_.z);
+        const Rgb entering =
+            retroRoughness_ < 0 ? (Rgb(1) - layer_.mean) * inverseRest(layer_.albedo(above)) : Rgb(1);
         diffuse_ *= entering * whole;
-        multiple_ *= (1 - mean.whole) * inverseRest(above.whole) * whole;
+        multiple_ *= (1 - layer_.row.mean().whole) * inverseRest(above.whole) * whole;
     }
-}
-
-/// Albedo of the dielectric layer, multiple scattering included.
-template <Features F>
-Rgb BasicBsdf<F>::dielectricAlbedo(const Albedo& a) const {
-    return dielectricF0_ * (a.whole - a.dielectric) + Rgb(dielectricF90_ * a.dielectric) +
-           dielectricMultiple_ * (1 - a.whole);
 }
 
 /// Lobes of effects that are left out are neither chosen nor added.

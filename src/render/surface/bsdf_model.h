@@ -12,6 +12,8 @@
 /// The surface model. Its parts are templates, defined in bsdf_energy.h and bsdf.h: include the latter.
 namespace vlx::render {
 
+struct DielectricLayer;
+
 /// A material's parameters at one point, textures applied. Ranges: colours, metallic, roughness,
 /// transmission, specular, clearcoat and clearcoatRoughness in [0, 1]; ior >= 1.
 struct SurfaceParameters {
@@ -31,6 +33,26 @@ struct SurfaceParameters {
     const AlbedoTable* albedoTable = nullptr;  ///< of this ior; required
     const SheenTable* sheenTable = nullptr;    ///< required where there is sheen
     const GlassTable* glassTable = nullptr;    ///< of this ior; without it rough glass loses a little energy
+    const DielectricLayer* layer = nullptr;    ///< of these; null: not known beforehand
+};
+
+/// A surface's dielectric reflection, as far as neither directions nor the base colour matter.
+struct DielectricLayer {
+    DielectricLayer() = default;
+    explicit DielectricLayer(const SurfaceParameters& surface);
+
+    /// Albedo, multiple scattering included.
+    Rgb albedo(const Albedo& a) const {
+        return f0 * (a.whole - a.dielectric) + Rgb(f90 * a.dielectric) + multiple * (1 - a.whole);
+    }
+
+    AlbedoTable::Row row;
+    float exactF0 = 0;  ///< of the index
+    Rgb f0;
+    float f90 = 0;
+    Rgb multiple;  ///< Kulla and Conty's factor
+    Rgb mean;      ///< albedo
+    Rgb rest;      ///< 1 / (1 - mean)
 };
 
 /// f |cos wi| and the density (per solid angle) with which sample() chooses wi, both without delta lobes.
@@ -131,7 +153,6 @@ class BasicBsdf {
     void leaveOut(const EffectSet& effects);
     void leaveAbove();
     void setReflecting(const SurfaceParameters& s, bool fromInside, float glass, float sheenEnergy);
-    Rgb dielectricAlbedo(const Albedo& a) const;
     struct GlassSplit {
         Rgb reflected;
         Rgb transmitted;
@@ -144,8 +165,14 @@ class BasicBsdf {
     BsdfSample finish(Vec3 wi, bool through) const;
     BsdfSample settled(BsdfSample delta) const;
 
+    static DielectricLayer layerOf(const SurfaceParameters& s) {
+        if constexpr (!F.reflection) return {};
+        return s.layer != nullptr ? *s.layer : DielectricLayer(s);
+    }
+
     Vec3 wo_;
-    Vec3 up_;  ///< the true normal
+    Vec3 up_;                ///< the true normal
+    DielectricLayer layer_;  ///< where F reflects
     float alpha_;
     float coatAlpha_;
     float retroRoughness_;   ///< -1: the surface is not of that kind
@@ -164,17 +191,12 @@ class BasicBsdf {
     float metal_;   ///< how much of each there is: metal,
     float opaque_;  ///< opaque dielectric
     Rgb metalF0_;
-    Rgb dielectricF0_;
-    float dielectricF90_ = 0;
-    Rgb dielectricMultiple_;  ///< Kulla and Conty's factor of the dielectric
-    Rgb multiple_;            ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
-    Rgb diffuse_;             ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
-    float glassWeight_ = 0;   ///< includes the multiple-scattering compensation
+    Rgb multiple_;           ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
+    Rgb diffuse_;            ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
+    float glassWeight_ = 0;  ///< includes the multiple-scattering compensation
     Rgb glassTint_;
     float ior_;
     float eta_;  ///< far side over near side
-    float exactF0_;
-    AlbedoTable::Row row_;
     Rgb albedo_;
     std::array<float, kLobes> probability_{};
 };

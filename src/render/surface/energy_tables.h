@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "render/surface/ggx.h"
@@ -15,11 +17,14 @@ struct alignas(16) Albedo {
     float whole = 1;       ///< of a perfect reflector: 1 minus what masking and shadowing lose
     float conductor = 0;   ///< `grazing` of metals: the part weighted by Schlick's (1 - cos)^5
     float dielectric = 0;  ///< `grazing` of dielectrics: the part weighted by dielectricWeight
+    float unused = 0;
 
-    Albedo operator*(float s) const { return {whole * s, conductor * s, dielectric * s}; }
-    Albedo operator+(const Albedo& o) const {
-        return {whole + o.whole, conductor + o.conductor, dielectric + o.dielectric};
-    }
+    Albedo operator*(float s) const { return std::bit_cast<Albedo>(lanes() * s); }
+    Albedo operator+(const Albedo& o) const { return std::bit_cast<Albedo>(lanes() + o.lanes()); }
+
+  private:
+    using Lanes [[gnu::vector_size(16)]] = float;
+    Lanes lanes() const { return std::bit_cast<Lanes>(*this); }
 };
 
 /// How far the exact Fresnel reflectance at cosTheta has risen from normal (0) to grazing incidence (1).
@@ -61,10 +66,8 @@ class AlbedoTable {
 
       private:
         friend class AlbedoTable;
-        const Albedo* low_ = nullptr;
-        const Albedo* high_ = nullptr;
-        const Albedo* lowMeans_ = nullptr;
-        const Albedo* highMeans_ = nullptr;
+        const AlbedoTable* table_ = nullptr;
+        std::uint32_t index_ = 0;  ///< between this roughness and the next
         float t_ = 0;
         Albedo mean_;
     };
@@ -89,24 +92,23 @@ class AlbedoTable {
 inline AlbedoTable::Row AlbedoTable::row(float roughness) const {
     const auto [i, t] = tablePosition(roughness, kSize);
     Row row;
-    row.low_ = cells_[i].data();
-    row.high_ = cells_[i + 1].data();
-    row.lowMeans_ = means_[i].data();
-    row.highMeans_ = means_[i + 1].data();
+    row.table_ = this;
+    row.index_ = static_cast<std::uint32_t>(i);
     row.t_ = t;
-    row.mean_ = row.lowMeans_[kTilts - 1] * (1 - t) + row.highMeans_[kTilts - 1] * t;
+    row.mean_ = means_[i][kTilts - 1] * (1 - t) + means_[i + 1][kTilts - 1] * t;
     return row;
 }
 
 inline Albedo AlbedoTable::Row::meanAbove(float cosTilt) const {
     const auto [k, t] = tablePosition(cosTilt, kTilts);
-    return (lowMeans_[k] * (1 - t) + lowMeans_[k + 1] * t) * (1 - t_) +
-           (highMeans_[k] * (1 - t) + highMeans_[k + 1] * t) * t_;
+    const auto &low = table_->means_[index_], &high = table_->means_[index_ + 1];
+    return (low[k] * (1 - t) + low[k + 1] * t) * (1 - t_) + (high[k] * (1 - t) + high[k + 1] * t) * t_;
 }
 
 inline Albedo AlbedoTable::Row::at(float cosTheta) const {
     const auto [j, t] = tablePosition(std::sqrt(std::max(0.f, cosTheta)), kSize);
-    return (low_[j] * (1 - t) + low_[j + 1] * t) * (1 - t_) + (high_[j] * (1 - t) + high_[j + 1] * t) * t_;
+    const auto &low = table_->cells_[index_], &high = table_->cells_[index_ + 1];
+    return (low[j] * (1 - t) + low[j + 1] * t) * (1 - t_) + (high[j] * (1 - t) + high[j + 1] * t) * t_;
 }
 
 /// Fraction of energy that single-scattering GGX reflection and refraction keep together at a dielectric

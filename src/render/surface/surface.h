@@ -108,45 +108,41 @@ SurfacePoint surfacePoint(const Scene& scene, const Hit& hit, const Vec3& rayDir
     return p;
 }
 
-/// The material there, textures applied.
-template <Features F>
-SurfaceParameters parametersAt(const Scene& scene, const SurfacePoint& point) {
-    const Material& m = *point.material;
-    const auto sampled = [&](const TextureRef& ref) {
-        countEffect(Effect::Textures);
-        return scene.textures[static_cast<std::size_t>(ref.texture)].lookup(point.uv.of(ref));
-    };
-    SurfaceParameters s;
-    s.baseColour = F.textures ? m.baseColour * point.colour : m.baseColour;
-    s.metallic = m.metallic;
-    s.roughness = m.roughness;
-    s.retro = m.retro;
-    s.transmission = m.transmission;
-    s.ior = m.ior;
-    s.specular = m.specular;
-    s.specularColour = m.specularColour;
-    s.clearcoat = m.clearcoat;
-    s.clearcoatRoughness = m.clearcoatRoughness;
-    s.sheenColour = m.sheenColour;
-    s.sheenRoughness = m.sheenRoughness;
-    if (!isBlack(m.sheenColour)) s.sheenTable = scene.sheenTables.data();
-    s.albedoTable = &scene.albedoTables[static_cast<std::size_t>(m.albedoTable)];
-    if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
-    if (!F.textures || !m.textured) return s;
+/// A material's own parameters, as they are where it has no textures.
+SurfaceParameters plainParameters(const Scene& scene, const Material& material);
 
-    if (m.baseColourTexture) s.baseColour *= sampled(m.baseColourTexture).rgb;
-    if (m.metallicRoughnessTexture) {
-        const Rgb t = sampled(m.metallicRoughnessTexture).rgb;
-        s.roughness *= t.y;
-        s.metallic *= t.z;
+/// Whether the textures of a material leave alone what its DielectricLayer is made of.
+inline bool hasOneLayer(const Material& m) {
+    return !m.metallicRoughnessTexture && !m.specularTexture && !m.specularColourTexture;
+}
+
+/// The material there: `plain` with textures and vertex colours applied.
+template <Features F>
+SurfaceParameters parametersAt(const Scene& scene, const SurfacePoint& point,
+                               const SurfaceParameters& plain) {
+    SurfaceParameters s = plain;
+    if constexpr (F.textures) {
+        const Material& m = *point.material;
+        s.baseColour *= point.colour;
+        if (!m.textured) return s;
+        const auto sampled = [&](const TextureRef& ref) {
+            countEffect(Effect::Textures);
+            return scene.textures[static_cast<std::size_t>(ref.texture)].lookup(point.uv.of(ref));
+        };
+        if (m.baseColourTexture) s.baseColour *= sampled(m.baseColourTexture).rgb;
+        if (m.metallicRoughnessTexture) {
+            const Rgb t = sampled(m.metallicRoughnessTexture).rgb;
+            s.roughness *= t.y;
+            s.metallic *= t.z;
+        }
+        if (m.transmissionTexture) s.transmission *= sampled(m.transmissionTexture).rgb.x;
+        if (m.specularTexture) s.specular *= sampled(m.specularTexture).a;
+        if (m.specularColourTexture) s.specularColour *= sampled(m.specularColourTexture).rgb;
+        if (m.clearcoatTexture) s.clearcoat *= sampled(m.clearcoatTexture).rgb.x;
+        if (m.clearcoatRoughnessTexture) s.clearcoatRoughness *= sampled(m.clearcoatRoughnessTexture).rgb.y;
+        if (m.sheenColourTexture) s.sheenColour *= sampled(m.sheenColourTexture).rgb;
+        if (m.sheenRoughnessTexture) s.sheenRoughness *= sampled(m.sheenRoughnessTexture).a;
     }
-    if (m.transmissionTexture) s.transmission *= sampled(m.transmissionTexture).rgb.x;
-    if (m.specularTexture) s.specular *= sampled(m.specularTexture).a;
-    if (m.specularColourTexture) s.specularColour *= sampled(m.specularColourTexture).rgb;
-    if (m.clearcoatTexture) s.clearcoat *= sampled(m.clearcoatTexture).rgb.x;
-    if (m.clearcoatRoughnessTexture) s.clearcoatRoughness *= sampled(m.clearcoatRoughnessTexture).rgb.y;
-    if (m.sheenColourTexture) s.sheenColour *= sampled(m.sheenColourTexture).rgb;
-    if (m.sheenRoughnessTexture) s.sheenRoughness *= sampled(m.sheenRoughnessTexture).a;
     return s;
 }
 
