@@ -30,31 +30,31 @@ std::string decoded(const std::string& uri) {
     return text;
 }
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-void keepOnly(Json& object, std::initializer_list<const char*> keys) {
+void keepOnly(OrderedJson& object, std::initializer_list<const char*> keys) {
     for (auto item = object.begin(); item != object.end();)
         item = std::ranges::find(keys, item.key()) == keys.end() ? object.erase(item) : std::next(item);
 }
 
 /// An array of an object, or an empty one.
-const Json& listOf(const Json& object, const char* key) {
-    static const Json none = Json::array();
+const OrderedJson& listOf(const OrderedJson& object, const char* key) {
+    static const OrderedJson none = OrderedJson::array();
     if (!object.is_object()) return none;
     const auto found = object.find(key);
     return found != object.end() && found->is_array() ? *found : none;
 }
 
-std::optional<std::size_t> indexOf(const Json& object, const char* key) {
+std::optional<std::size_t> indexOf(const OrderedJson& object, const char* key) {
     if (!object.is_object() || !object.contains(key) || !object[key].is_number_unsigned()) return {};
     return object[key].get<std::size_t>();
 }
 
 /// The nodes that have cameras, and all above them.
-std::set<std::size_t> cameraNodes(const Json& nodes) {
+std::set<std::size_t> cameraNodes(const OrderedJson& nodes) {
     std::map<std::size_t, std::size_t> parents;
     for (std::size_t i = 0; i < nodes.size(); ++i)
-        for (const Json& child : listOf(nodes[i], "children"))
+        for (const OrderedJson& child : listOf(nodes[i], "children"))
             if (child.is_number_unsigned()) parents[child.get<std::size_t>()] = i;
     std::set<std::size_t> found;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -66,11 +66,11 @@ std::set<std::size_t> cameraNodes(const Json& nodes) {
 }
 
 /// Leaves the channels that move one of the nodes, and the animations that have any.
-Json animationsOf(const Json& animations, const std::set<std::size_t>& nodes) {
-    Json kept = Json::array();
-    for (Json animation : animations) {
-        Json channels = Json::array();
-        for (const Json& channel : listOf(animation, "channels"))
+OrderedJson animationsOf(const OrderedJson& animations, const std::set<std::size_t>& nodes) {
+    OrderedJson kept = OrderedJson::array();
+    for (OrderedJson animation : animations) {
+        OrderedJson channels = OrderedJson::array();
+        for (const OrderedJson& channel : listOf(animation, "channels"))
             if (channel.is_object() && channel.contains("target"))
                 if (const auto node = indexOf(channel["target"], "node"); node && nodes.contains(*node))
                     channels.push_back(channel);
@@ -106,9 +106,10 @@ std::string gltfJson(const std::string& path) {
 }
 
 std::string camerasAlone(const std::string& json) {
-    Json file = Json::parse(json, nullptr, false);
+    OrderedJson file = OrderedJson::parse(json, nullptr, false);
     if (!file.is_object()) return {};
-    const Json animations = animationsOf(listOf(file, "animations"), cameraNodes(listOf(file, "nodes")));
+    const OrderedJson animations =
+        animationsOf(listOf(file, "animations"), cameraNodes(listOf(file, "nodes")));
     if (animations.empty()) {
         keepOnly(file, {"asset", "scene", "scenes", "nodes", "cameras"});
     } else {
@@ -117,7 +118,7 @@ std::string camerasAlone(const std::string& json) {
         file["animations"] = animations;
     }
     if (file.contains("nodes") && file["nodes"].is_array())
-        for (Json& node : file["nodes"])
+        for (OrderedJson& node : file["nodes"])
             if (node.is_object())
                 keepOnly(node, {"name", "camera", "children", "matrix", "translation", "rotation", "scale",
                                 "extras"});
