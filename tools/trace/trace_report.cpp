@@ -108,7 +108,9 @@ void warnOfBrightness(const TraceOptions& o, const Scene& loaded, const RenderRe
     const bool bright = mean > kBrightest;
     const LightUnits units = loaded.report.lightUnits;
     std::string remedy;
-    if (bright && units == LightUnits::Radiometric)
+    if (mean == 0)
+        remedy = "nothing that it shows is lit; --env-constant 1,1,1 lights it from all around";
+    else if (bright && units == LightUnits::Radiometric)
         remedy = "--light-units photometric divides its lights by 683 lm/W";
     else if (!bright && units == LightUnits::Photometric)
         remedy = "--light-units radiometric takes its lights as they are, 683 times as strong";
