@@ -280,9 +280,15 @@ TEST_F(Input, ReplicatesThatAreNoNumbersAreRefused) {
 }
 
 TEST_F(Input, RadianceWhoseSquaresAreNoFloatsIsRefused) {
-    writeSamples(folder / "bright.exr", {"R", "G", "B"}, [](int, int, int, float, float) {
-        return std::vector<float>{1e20f, 2e20f, 1e20f};
-    });
+    DumpHeader header;
+    header.data = header.display = {0, 0, 12, 9};
+    header.channels = {{"R"}, {"G"}, {"B"}};
+    SampleBand band{0, 0, 12, 9, {0}, {"R", "G", "B"}, {}};
+    band.values.assign(3, std::vector<float>(4 * 12 * 9, 1e20f));
+    for (std::size_t p = 1; p <= 12 * 9; ++p) band.offsets.push_back(4 * p);
+    DumpWriter writer(folder / "bright.exr", header);
+    writer.write(band);
+    writer.close();
     ends({folder / "bright.exr"}, 1, "expected radiance up to 2^50");
     ends({folder / "bright.exr", "--method", "mean"}, 0, "");
     Image image({0, 0, 12, 9}, {"R", "G", "B", "variance.R", "variance.G", "variance.B"});
