@@ -111,6 +111,7 @@ void SampledFrame::gather(int until) {
             counts_.samples += of.samples;
             counts_.dropped += of.dropped;
             counts_.empty += of.empty;
+            counts_.range.add(of.range);
             counts_.limited += of.limited;
             counts_.luminance += of.luminance;
             counts_.removed += of.removed;

@@ -25,6 +25,7 @@ struct LoadedFrame {
         samples.own(first, first + outline.data.height);
         requireFrames(options, held);
         samples.frame().fillAll();
+        samples.frame().counts().range.require(source->path(), "of the picture");
     }
 
     /// That as many as are held at a time fit into memory, with the stages of one that is kriged and the
