@@ -199,8 +199,8 @@ void checkOptions(const TraceOptions& o) {
                                                      formatted("%g", static_cast<double>(value)));
     };
     requireWithin("--env-constant", o.environmentConstant, std::numeric_limits<float>::max());
-    requireWithin("--camera-position", o.position, 1e9f);  // metres, as of all that is in a scene
-    requireWithin("--look-at", o.target, 1e9f);
+    requireWithin("--camera-position", o.position, kFarthest);
+    requireWithin("--look-at", o.target, kFarthest);
     if (o.integrator == IntegratorRequest::Bidirectional && o.targetError > 0)
         throw CLI::ValidationError("--target-error", "judges by path tracing: not with bidirectional");
 }
