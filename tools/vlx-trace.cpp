@@ -21,6 +21,7 @@
 #include "trace/trace_report.h"
 #include "trace/trace_view.h"
 #include "variolux/base/parallel.h"
+#include "variolux/base/text.h"
 
 namespace {
 
@@ -35,6 +36,27 @@ vlx::Fingerprint inputs(const TraceOptions& o) {
     for (const std::string& file : gltfFiles(o.scene)) made.addFile(file);
     for (const std::string& file : {o.environment.image, o.earlierPath, o.mapPath}) made.addFile(file);
     return made;
+}
+
+/// For kPictureAttribute: what --append may not change.
+std::string pictureOf(const TraceOptions& o, const Scene& loaded, const EffectRequest& request) {
+    vlx::Fingerprint scene, environment;
+    for (const std::string& file : gltfFiles(o.scene)) scene.addFile(file);
+    environment.addFile(o.environment.image);
+    for (const float v : o.environmentConstant) environment.add("constant", std::to_string(v));
+    std::string leftOut;
+    for (std::size_t e = 0; e < kEffects; ++e)
+        if (request.without.has(static_cast<Effect>(e))) leftOut += "-" + std::string(kEffectNames[e]);
+    const auto text = [](double v) { return vlx::formatted("%.9g", v); };
+    std::string variant = o.variant;
+    std::ranges::replace(variant, ';', ',');
+    const bool moves = loaded.animations > 0;
+    return "scene: " + scene.text() + "; environment: " + environment.text() + "; light units: " +
+           (loaded.report.lightUnits == LightUnits::Photometric ? "photometric" : "radiometric") +
+           "; variant: " + (variant.empty() ? "default" : variant) + "; exposure: " +
+           (moves ? text(loaded.shutter.open) + " to " + text(loaded.shutter.close) + " s" : "any") +
+           "; most bounces: " + std::to_string(o.render.path.maxBounces) +
+           "; effects left out: " + (leftOut.empty() ? "none" : leftOut);
 }
 
 IntegratorChoice chooseIntegrator(const TraceOptions& o, const Scene& loaded,
@@ -123,6 +145,7 @@ int runOne(TraceOptions& o, const vlx::Progress& progress) {
     for (const std::string& warning : plan.warnings) note(o, "warning: " + warning);
     applyPlan(loaded, plan);
     o.render.follow(plan);
+    o.render.picture = pictureOf(o, loaded, *request);
     if (plan.motion.recorded) note(o, "motion is recorded: " + plan.motion.reason);
     const Accelerator accelerator(loaded, o.render.path.effects);
     if (o.tellsView) warnOfBacks(o, loaded, accelerator);

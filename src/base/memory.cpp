@@ -25,6 +25,11 @@ std::uint64_t residentMemory() {
     return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
 }
 
+std::string memoryLimitFor(std::uint64_t bytes) {
+    constexpr std::uint64_t kVaries = 2'000'000;
+    return std::to_string((bytes + kVaries + 999'999) / 1'000'000) + "M";
+}
+
 void requireMemory(std::string_view path, std::uint64_t bytes, std::string_view what) {
     const std::uint64_t available = availableMemory();
     if (bytes > available)

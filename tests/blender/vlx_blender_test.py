@@ -79,7 +79,8 @@ class Case(unittest.TestCase):
 class Pictures(Case):
     def test_light_groups_add_up_and_the_file_stays(self):
         before = hashlib.sha256(contents(os.path.join(SCENES, "plain.blend"))).digest()
-        self.run_it("plain.blend", "room.exr", *QUICK, "--keep-samples", self.path("new"))
+        said = self.run_it("plain.blend", "room.exr", *QUICK, "--keep-samples", self.path("new"))
+        self.assertNotIn("no sample has light", said)
         self.assertEqual(before, hashlib.sha256(contents(os.path.join(SCENES, "plain.blend"))).digest())
         self.assertEqual(self.left(), ["new", "room.exr"])
         channels, attributes = exr.read(self.path("room.exr"))
@@ -122,7 +123,7 @@ class Pictures(Case):
         self.assertGreater(channels[LAYER + "Depth.Z"][middle], 5)
 
     def test_more_images_until_the_error_is_met(self):
-        # vlx-krige with a predicted error that is known: 0.04 of two images, falling as theory has it.
+        # vlx-krige with a predicted error that is known: 0.04 of two images, falling as theory has it. It finds no light.
         os.mkdir(self.path("bin"))
         for name in ("vlx-blender", "vlx-pack"):
             os.symlink(os.path.realpath(os.path.join(BIN, name)), self.path("bin/" + name))
@@ -134,6 +135,8 @@ done = subprocess.run([{os.path.join(BIN, "vlx-krige")!r}, *sys.argv[1:]], stdou
 if "--json" in sys.argv and done.stdout:
     report = json.loads(done.stdout)
     report["predictedRelMse"] = 0.04 * (2 / (report["samples"] / 1280)) ** 0.6
+    assert report["light"] > 0
+    report["light"] = 0.0
     done.stdout = json.dumps(report)
 print(done.stdout, end="")
 sys.exit(done.returncode)
@@ -149,6 +152,7 @@ sys.exit(done.returncode)
         self.assertIn("relMSE 0.04 with 2 samples a pixel: goes on to 6", said)
         self.assertIn("relMSE 0.0207 with 6 samples a pixel: goes on to 7", said)
         self.assertIn("7 samples a pixel, predicted relMSE 0.0189", said)
+        self.assertEqual(said.count("frame 3: no sample has light\n"), 1)
         run_it(0, "b.exr", "--images", "7")
         self.assertEqual(exr.read(self.path("a.exr"))[0], exr.read(self.path("b.exr"))[0])
         said = run_it(3, "c.exr", "--images", "2", "--target-error", "relmse=0.02", "--max-images", "3", "-q")
@@ -333,7 +337,19 @@ class BadInput(Case):
             self.told(expected, "plain.blend", "a.exr", *no_blender, "--", *krige, code=2)
         self.told("how good a frame is would depend on how many images its neighbours get. Take one of them; with --temporal choose "
                   "--images", "plain.blend", "a_##.exr", "--temporal", "1", "--target-error", "relmse=1", code=2)
-        self.told("--frames: expected before --", "plain.blend", "a.exr", "--", "--frames", "1", code=2)
+        for option in ("--frames", "-q"):
+            self.told(f"{option}: give it before --\n", "plain.blend", "a.exr", *no_blender, "--", option, "1", code=2)
+        for option in ("--json", "--drop-layers", "--radiance", "--template"):
+            self.told(f"{option}: not with vlx-blender\n", "plain.blend", "a.exr", *no_blender, "--", option, code=2)
+        for option in ("--frames", "--view-layer", "--keep-samples", "--blender", "--output"):
+            self.told(f"{option}: expected a value, found an empty one", "plain.blend", "a.exr", *no_blender, option, "", code=2)
+            self.told(f"{option}: expected a value, found an empty one", "plain.blend", "a.exr", *no_blender, option + "=", code=2)
+        for option in ("--images", "--spp", "--max-images", "--temporal", "--threads", "--target-error", "--engine", "--log"):
+            self.told(f"{option}: ", "plain.blend", "a.exr", *no_blender, option, "", code=2)
+        self.told("--max-images: only with --target-error", "plain.blend", "a.exr", *no_blender, "--max-images", "64", code=2)
+        self.told("without a word of Blender's", "plain.blend", "a.exr", *no_blender, "--images", "100")  # above --max-images' default
+        self.told("--max-images: expected at least --images, 8, found 7", "plain.blend", "a.exr", *no_blender, "--images", "8",
+                  "--max-images", "7", "--target-error", "relmse=1", code=2)
         self.told("expected frames such as 1-100x2,150, found '4-1'", "plain.blend", "a_##.exr", "--frames", "4-1", code=2)
         self.told("expected one of ViewLayer, found 'Foreground'", "plain.blend", "a.exr", "--view-layer", "Foreground", code=2)
         self.told("expected relmse=X with X above 0, found '0.01'", "plain.blend", "a.exr", "--target-error", "0.01", code=2)

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <random>
@@ -276,6 +277,30 @@ TEST_F(Input, ReplicatesThatAreNoNumbersAreRefused) {
     ends({folder / "nan.exr"}, 1,
          "expected whole numbers from 0 to 2^32-1 in channel sample.replicate, found -1.000000 in pixel (3, "
          "9)");
+}
+
+TEST_F(Input, RadianceWhoseSquaresAreNoFloatsIsRefused) {
+    DumpHeader header;
+    header.data = header.display = {0, 0, 12, 9};
+    header.channels = {{"R"}, {"G"}, {"B"}};
+    SampleBand band{0, 0, 12, 9, {0}, {"R", "G", "B"}, {}};
+    band.values.assign(3, std::vector<float>(4 * 12 * 9, 1e20f));
+    for (std::size_t p = 1; p <= 12 * 9; ++p) band.offsets.push_back(4 * p);
+    DumpWriter writer(folder / "bright.exr", header);
+    writer.write(band);
+    writer.close();
+    ends({folder / "bright.exr"}, 1, "expected radiance up to 2^50");
+    ends({folder / "bright.exr", "--method", "mean"}, 0, "");
+    Image image({0, 0, 12, 9}, {"R", "G", "B", "variance.R", "variance.G", "variance.B"});
+    std::fill(image.pixels.begin(), image.pixels.end(), 1e18f);
+    writeImage(folder / "flat.exr", image);
+    std::vector<std::string> flat = {folder / "flat.exr", "--variance-is", "mean", "--drop-layers"};
+    ends(flat, 1, "--map R=1e-12*R (G, B likewise, variance.R=1e-24*variance.R)");
+    for (const char* c : {"R", "G", "B"}) {
+        flat.insert(flat.end(), {"--map", std::string(c) + "=1e-12*" + c});
+        flat.insert(flat.end(), {"--map", std::string("variance.") + c + "=1e-24*variance." + c});
+    }
+    ends(flat, 0, "");
 }
 
 }  // namespace

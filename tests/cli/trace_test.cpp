@@ -223,6 +223,32 @@ TEST(VlxTrace, FramesHoldMotionWhereSomethingMoves) {
                      .contains("motion"));
 }
 
+TEST(VlxTrace, AppendsNothingOfAnotherPicture) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "a.exr", more = folder / "more.exr";
+    const auto run = [&](std::vector<std::string> options) {
+        options.insert(options.begin(), {kScene, "-o", more, "--width", "12", "--spp", "2", "--append", out});
+        return trace(options);
+    };
+    ASSERT_EQ(trace({kScene, "-o", out, "--width", "12", "--spp", "2"}).exitCode, 0);
+    const std::string before = contentsOf(out);
+    for (const auto& [options, words] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+             {{"--max-bounces", "1"}, "most bounces: 12, not 1;"},
+             {{"--env-constant", "1,1,1"}, "environment: "},
+             {{"--light-units", "photometric"}, "light units: radiometric, not photometric"},
+             {{"--effects", "auto,-diffuse"}, "effects left out: none, not -diffuse"}}) {
+        const ToolRun other = run(options);
+        EXPECT_EQ(other.exitCode, 1) << other.err;
+        EXPECT_NE(other.err.find("expected samples of the picture that is traced, found others: "),
+                  std::string::npos)
+            << other.err;
+        EXPECT_NE(other.err.find(words), std::string::npos) << other.err;
+        EXPECT_FALSE(std::filesystem::exists(more));
+    }
+    const ToolRun same = run({"--seed", "7", "--effects", "all", "--integrator", "path"});
+    EXPECT_EQ(same.exitCode, 0) << same.err;
+}
+
 TEST(VlxTrace, AppendsToADump) {
     const TemporaryFolder folder;
     ASSERT_EQ(
@@ -315,7 +341,7 @@ TEST(VlxTrace, WhatIsWrongWithTheViewIsToldBeforeTheSceneIsRead) {
         EXPECT_EQ(run.err.find("--env"), std::string::npos) << run.err;
         EXPECT_EQ(folder.entries(), 1);
     };
-    ends({"--camera", "7"}, 1, "has no camera '7'; it has 'cam0'");
+    ends({"--camera", "7"}, 1, "has no camera '7'; it has 0 'cam0'");
     ends({"--crop", "0,0,9,9", "--width", "8"}, 2, "found --crop 0,0,9,9");
     ends({"--width", "1048576"}, 2, "at most 4294967296 pixels to trace, found 1048576 x 1048576");
     ends({"--width", "1048576"}, 2, "--crop or --band");

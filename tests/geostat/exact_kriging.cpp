@@ -1,14 +1,15 @@
 #include "exact_kriging.h"
 
-#include <boost/multiprecision/cpp_bin_float.hpp>
+#include <boost/multiprecision/mpfr.hpp>
 #include <vector>
 
 namespace vlx::testing {
 namespace {
 
 using Eigen::Index;
-using Real =
-    boost::multiprecision::number<boost::multiprecision::cpp_bin_float<400>, boost::multiprecision::et_off>;
+/// GNU MPFR's: the library under test computes with numbers of Boost's own.
+using Real = boost::multiprecision::number<boost::multiprecision::mpfr_float_backend<400>,
+                                           boost::multiprecision::et_off>;
 using Row = std::vector<Real>;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -95,9 +96,10 @@ ExactKriging solve(const Setting& setting, Right right) {
     const std::size_t p = drift[0].size(), size = at(n) + p;
     std::vector<Row> a(size, Row(size, Real(0)));
     for (std::size_t i = 0; i < at(n); ++i) {
-        for (std::size_t j = 0; j < at(n); ++j) {
+        for (std::size_t j = 0; j <= i; ++j) {
             a[i][j] = setting.covariance(places[i], places[j]);
             if (places[i] == places[j]) a[i][j] += problem.model.nugget;
+            a[j][i] = a[i][j];
         }
         if (problem.errorVariances.size() > 0) a[i][i] += problem.errorVariances[static_cast<Index>(i)];
         for (std::size_t j = 0; j < p; ++j) a[i][at(n) + j] = a[at(n) + j][i] = drift[i][j];

@@ -237,6 +237,43 @@ TEST(Values, OutOfRangeAreTakenAsTheNearestAndToldOf) {
     EXPECT_EQ(load(g.json, g).report.warnings.back(), "and 3 values more that are out of range");
 }
 
+TEST(Values, BelowNothingAreTakenAsNothingAndToldOf) {
+    GltfText g;
+    g.json["materials"][0]["emissiveFactor"] = {-1, 0.5, 7};
+    g.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =
+        g.floats({-1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1}, "VEC3");
+    const Scene s = load(g.json, g);
+    EXPECT_EQ(s.materials[0].emission, (Rgb{0, 0.5f, 7}));
+    EXPECT_EQ(s.colours[0].rgb, (Rgb{0, 1, 1}));
+    EXPECT_EQ(s.report.warnings,
+              (std::vector<std::string>{"materials[0].emissiveFactor: expected numbers of 0 or more, found "
+                                        "[-1,0.5,7]: the nearest are taken",
+                                        "mesh 0 'square': COLOR_0 has values below 0: 0 is taken"}));
+}
+
+TEST(Json, ThatIsNestedTooDeepIsRefused) {
+    const TemporaryFolder folder;
+    for (const int depth : {250, 200000}) {
+        GltfText g;
+        std::string text = g.text();
+        text.insert(text.rfind('}'), ", \"extras\": " + std::string(static_cast<std::size_t>(depth), '[') +
+                                         std::string(static_cast<std::size_t>(depth), ']'));
+        writeText(folder / "deep.gltf", text);
+        for (const auto& read : {+[](const std::string& path) { return loadScene(path); },
+                                 +[](const std::string& path) { return loadCameras(path); }}) {
+            try {
+                read(folder / "deep.gltf");
+                ADD_FAILURE() << depth;
+            } catch (const Error& e) {
+                EXPECT_NE(std::string(e.what()).find("up to 200 deep"), std::string::npos) << e.what();
+            }
+        }
+    }
+    GltfText quoted;
+    quoted.json["asset"]["generator"] = std::string(500, '[') + "\"" + std::string(500, '{');
+    EXPECT_EQ(failure(quoted.json, quoted), "no error");
+}
+
 TEST(Values, OfSeveralWordsAreOneOfThem) {
     GltfText g;
     g.json["meshes"][0]["primitives"][0]["mode"] = 9;
@@ -289,6 +326,8 @@ TEST(Files, OfBuffersMustBeThere) {
     expectWord("/dev/zero", "found a pipe or device");
     expectWord("data:model/other;base64," + std::string(10000, 'A'), "found data:model/other;base64");
     expectWord("data:" + std::string(10000, 'A'), "found data:AAA");
+    expectWord("data:application/octet-stream;base64," + std::string(100000, 'A'),
+               "expected 60 bytes (its byteLength), found 75000");
     std::filesystem::create_directory(folder / "a.glb");
     try {
         loadScene(folder / "a.glb");
@@ -296,6 +335,14 @@ TEST(Files, OfBuffersMustBeThere) {
     } catch (const Error& e) {
         EXPECT_NE(std::string(e.what()).find("expected a glTF file, found a folder"), std::string::npos)
             << e.what();
+    }
+}
+
+TEST(Files, OfImagesAreNoFoldersOrDevices) {
+    for (const auto& [uri, found] : {std::pair{".", "a folder"}, {"/dev/zero", "a pipe or device"}}) {
+        GltfText g = textured();
+        g.json["images"][0] = {{"uri", uri}};
+        expectFailureWith({"images[0].uri: expected a file beside it", found}, g.json, g);
     }
 }
 
@@ -312,6 +359,9 @@ TEST(Places, BeyondWhatFloatsCanTurnAreRefused) {
     light.json["nodes"][2]["translation"] = {0, 0, 1e19};
     light.json["nodes"][2]["extras"]["radius"] = 1;
     expectFailureWith({"node 2", "the light is more than 1e9 m from the origin"}, light.json, light);
+    GltfText camera;
+    camera.json["nodes"][1]["translation"] = {0, 0, 1e19};
+    EXPECT_EQ(load(camera.json, camera).cameras[0].unusable, "it is more than 1e9 m from the origin");
     GltfText fine;
     fine.json["nodes"][0]["scale"] = {1e8, 1e8, 1e8};
     EXPECT_EQ(failure(fine.json, fine), "no error");

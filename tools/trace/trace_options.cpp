@@ -1,11 +1,13 @@
 #include "trace/trace_options.h"
 
 #include <cmath>
+#include <limits>
 
 #include "finished.h"
 #include "frames.h"
 #include "tool_main.h"
 #include "variolux/base/hash.h"
+#include "variolux/base/text.h"
 
 namespace vlx::render {
 
@@ -189,13 +191,16 @@ void checkOptions(const TraceOptions& o) {
     if (o.shutter.size() == 2 &&
         !(std::isfinite(o.shutter[0]) && std::isfinite(o.shutter[1]) && o.shutter[0] <= o.shutter[1]))
         throw CLI::ValidationError("--shutter", "expected two finite times, the second not before the first");
-    const auto requireFinite = [](const char* name, const std::vector<float>& values) {
+    const auto requireWithin = [](const char* name, const std::vector<float>& values, float most) {
         for (const float value : values)
-            if (!std::isfinite(value)) throw CLI::ValidationError(name, "expected finite values");
+            if (!(std::abs(value) <= most))
+                throw CLI::ValidationError(name, "expected values up to " +
+                                                     formatted("%g", static_cast<double>(most)) + ", found " +
+                                                     formatted("%g", static_cast<double>(value)));
     };
-    requireFinite("--env-constant", o.environmentConstant);
-    requireFinite("--camera-position", o.position);
-    requireFinite("--look-at", o.target);
+    requireWithin("--env-constant", o.environmentConstant, std::numeric_limits<float>::max());
+    requireWithin("--camera-position", o.position, kFarthest);
+    requireWithin("--look-at", o.target, kFarthest);
     if (o.integrator == IntegratorRequest::Bidirectional && o.targetError > 0)
         throw CLI::ValidationError("--target-error", "judges by path tracing: not with bidirectional");
 }

@@ -20,8 +20,7 @@ int printCameras(const TraceOptions& o, const Scene& loaded) {
         note(o, loaded.cameraFault +
                     ": one is made that has the whole scene in its picture, from 45 degrees to the right of "
                     "the front (+z) and 22.5 up (rendering and --explain tell its --camera-position, "
-                    "--look-at and "
-                    "--fov)");
+                    "--look-at and --fov)");
     for (std::size_t i = 0; i < loaded.cameras.size(); ++i) {
         const Camera& c = loaded.cameras[i];
         std::cout << i << "  " << c.name
@@ -95,8 +94,7 @@ void warnOfBacks(const TraceOptions& o, const Scene& loaded, const Accelerator& 
     if (2 * hidden <= met) return;
     note(o, "warning: " + std::to_string(100 * hidden / met) +
                 " % of what is in the picture shows its back, and is not seen: the surfaces have one side. "
-                "Where that "
-                "is not meant, turn their triangles round, or set their materials' doubleSided");
+                "Where that is not meant, turn their triangles round, or set their materials' doubleSided");
 }
 
 void warnOfBrightness(const TraceOptions& o, const Scene& loaded, const RenderReport& report) {
@@ -108,7 +106,9 @@ void warnOfBrightness(const TraceOptions& o, const Scene& loaded, const RenderRe
     const bool bright = mean > kBrightest;
     const LightUnits units = loaded.report.lightUnits;
     std::string remedy;
-    if (bright && units == LightUnits::Radiometric)
+    if (mean == 0)
+        remedy = "nothing that it shows is lit; --env-constant 1,1,1 lights it from all around";
+    else if (bright && units == LightUnits::Radiometric)
         remedy = "--light-units photometric divides its lights by 683 lm/W";
     else if (!bright && units == LightUnits::Photometric)
         remedy = "--light-units radiometric takes its lights as they are, 683 times as strong";

@@ -33,7 +33,9 @@ std::size_t chosenCamera(const TraceOptions& o, const Scene& loaded) {
     if (loaded.cameras.empty())
         throw Error(o.scene, "has no camera '" + o.camera + "', and no other; without --camera one is made");
     std::string names;
-    for (const Camera& c : loaded.cameras) names += (names.empty() ? "'" : ", '") + c.name + "'";
+    for (std::size_t i = 0; i < loaded.cameras.size(); ++i)
+        names += (i == 0 ? "" : ", ") + std::to_string(i) +
+                 (loaded.cameras[i].name.empty() ? "" : " '" + loaded.cameras[i].name + "'");
     throw Error(o.scene, "has no camera '" + o.camera + "'; it has " + names);
 }
 

@@ -115,8 +115,9 @@ struct DriftSteps {
 /// picture's width, not its height. Every channel gets the same weights: parts that add up to R, G, B still
 /// do. A pixel without samples is predicted and counted; a sample with radiance that is not finite, or beyond
 /// 2^50, is left out and counted. reconstruct() throws Error when options name channels that the dump lacks,
-/// ask for a scale where it has no positions or for more bands than rows, and when maxMemory is too little,
-/// saying what would do.
+/// ask for a scale where it has no positions or for more bands than rows, when maxMemory is too little,
+/// saying what would do, and when more than 16 samples and 1 in 1000 are beyond 2^50: that is no firefly, but
+/// a picture in too small a unit; of rows spread over it this is known before any work, else at the end.
 struct Drift {
     Quality quality = Quality::Standard;
     Fireflies fireflies = Fireflies::Robust;

@@ -92,6 +92,43 @@ class Sums {
     double radiance_[3] = {}, squares_[3] = {}, samples_ = 0, freedom_ = 0;
 };
 
+struct Measured {
+    Sums sums;
+    RadianceRange range;
+};
+
+/// Radiance in units of 2^exponent.
+void scaleRadiance(SampleBand& band, const SampleLayout& layout, int exponent) {
+    for (std::size_t c = 0; c < 3; ++c) {
+        for (float& value : band.values[c]) value = std::ldexp(value, -exponent);
+        if (layout.variance < 0) continue;
+        for (float& value : band.values[static_cast<std::size_t>(layout.variance) + c])
+            value = std::ldexp(value, -2 * exponent);
+    }
+}
+
+/// Rows spread evenly; all where these hold no light. With an exponent above 0 that of R, G, B only.
+Measured measureRows(const SampleSource& dump, const SampleLayout& layout, int exponent) {
+    const DumpHeader& header = dump.header();
+    const GatheredPlanes planes{layout.radiance, layout.features};
+    RowRing ring(header.data.width, planes.channels(), 1);
+    const auto measured = [&](int rows) {
+        Measured of{Sums(header.data.width), {}};
+        for (int i = 0; i < rows; ++i) {
+            const auto row =
+                static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(header.data.height) / (2 * rows));
+            SampleBand band = readRows(dump, layout, 1, row, 1);
+            if (exponent > 0) scaleRadiance(band, layout, exponent);
+            of.range.add(gatherRow(band, layout, planes, 0, 0, ring, 0).range);
+            of.sums.add(ring, planes, header.data.width);
+        }
+        return of;
+    };
+    const Measured some = measured(std::min(kRows, header.data.height));
+    const bool enough = some.sums.light() || some.range.exceeded() || header.data.height <= kRows;
+    return enough ? some : measured(header.data.height);
+}
+
 }  // namespace
 
 double PictureScale::agreedDeviation(double value, double samples) const {
@@ -112,25 +149,23 @@ double PictureScale::semivarianceAt(int c, double pixels) const {
 }
 
 PictureScale measurePictureScale(const SampleSource& dump) {
-    return measurePictureScale(dump, chooseSampleLayout(dump, {.standardFeatures = false}));
+    const SampleLayout layout = chooseSampleLayout(dump, {.standardFeatures = false});
+    const Measured measured = measureRows(dump, layout, 0);
+    if (!measured.range.exceeded()) return measured.sums.scale();
+    const int exponent = std::ilogb(measured.range.most) + 1 - std::ilogb(kMostRadiance);
+    PictureScale picture = measureRows(dump, layout, exponent).sums.scale();
+    picture.level = std::ldexp(picture.level, exponent);
+    for (int c = 0; c < 3; ++c) {
+        picture.variance[c] = std::ldexp(picture.variance[c], 2 * exponent);
+        for (double& value : picture.semivariance[c]) value = std::ldexp(value, 2 * exponent);
+    }
+    return picture;
 }
 
 PictureScale measurePictureScale(const SampleSource& dump, const SampleLayout& layout) {
-    const DumpHeader& header = dump.header();
-    const GatheredPlanes planes{layout.radiance, layout.features};
-    RowRing ring(header.data.width, planes.channels(), 1);
-    const auto sumsOf = [&](int rows) {
-        Sums sums(header.data.width);
-        for (int i = 0; i < rows; ++i) {
-            const auto row =
-                static_cast<int>((2 * i + 1) * static_cast<std::int64_t>(header.data.height) / (2 * rows));
-            gatherRow(readRows(dump, layout, 1, row, 1), layout, planes, 0, 0, ring, 0);
-            sums.add(ring, planes, header.data.width);
-        }
-        return sums;
-    };
-    const Sums sums = sumsOf(std::min(kRows, header.data.height));
-    return sums.light() || header.data.height <= kRows ? sums.scale() : sumsOf(header.data.height).scale();
+    const Measured measured = measureRows(dump, layout, 0);
+    measured.range.require(dump.path(), "in rows spread over the picture");
+    return measured.sums.scale();
 }
 
 }  // namespace vlx

@@ -43,8 +43,9 @@ inline double unseenVariance(double samples, double level) {
     return 3 / (samples > 3 ? samples : 3) * level * level;
 }
 
+/// Throws Error where these rows have too much radiance (RadianceRange).
 PictureScale measurePictureScale(const SampleSource& dump, const SampleLayout& layout);
-/// The same for methods that know no features.
+/// The same for methods that know no features, and compute in double precision: of any finite radiance.
 PictureScale measurePictureScale(const SampleSource& dump);
 
 }  // namespace vlx

@@ -6,6 +6,7 @@
 
 #include "variolux/base/error.h"
 #include "variolux/base/hash.h"
+#include "variolux/base/text.h"
 #include "variolux/dump/format.h"
 
 namespace vlx {
@@ -40,9 +41,6 @@ void requireChannel(const SampleSource& dump, const SampleLayout& layout, const 
             "channel '" + channel + "' is used already and cannot be named again by --feature or --radiance");
 }
 
-/// Sums of squares of such radiances are finite floats still; no light is as bright.
-constexpr float kMostRadiance = 0x1p50f;
-
 /// Whether the radiance of a sample is finite and at most kMostRadiance, its channels those from `first` on;
 /// alpha is none.
 bool usable(const SampleBand& band, const SampleLayout& layout, std::size_t first, std::size_t sample) {
@@ -51,6 +49,17 @@ bool usable(const SampleBand& band, const SampleLayout& layout, std::size_t firs
             !(std::abs(band.values[first + static_cast<std::size_t>(c)][sample]) <= kMostRadiance))
             return false;
     return true;
+}
+
+/// The greatest magnitude of a sample's radiance; not finite where one of its channels is not.
+float greatestRadiance(const SampleBand& band, const SampleLayout& layout, std::size_t sample) {
+    float most = 0;
+    for (int c = 0; c < layout.radiance; ++c) {
+        const float value = std::abs(band.values[static_cast<std::size_t>(c)][sample]);
+        if (c != layout.alpha && !(value <= most)) most = value;
+        if (!std::isfinite(most)) break;
+    }
+    return most;
 }
 
 /// 99th percentiles of the magnitudes of features `first` and on, over rows spread evenly.
@@ -127,6 +136,28 @@ void countedValues(const float* in, std::size_t n, float scale, float* out) {
 }
 
 }  // namespace
+
+void RadianceRange::add(const RadianceRange& other) {
+    finite += other.finite;
+    beyond += other.beyond;
+    most = std::max(most, other.most);
+}
+
+bool RadianceRange::exceeded() const {
+    constexpr std::int64_t kFireflies = 16, kOneIn = 1000;
+    return beyond > kFireflies && beyond > finite / kOneIn;
+}
+
+void RadianceRange::require(const std::string& path, const std::string& where) const {
+    if (!exceeded()) return;
+    throw Error(path,
+                "expected radiance up to 2^50 (1.1e+15), of which floats hold the squares, found up to " +
+                    formatted("%.3g", static_cast<double>(most)) + ": " + std::to_string(beyond) + " of " +
+                    std::to_string(finite) + " samples " + where +
+                    " are beyond. A lower exposure or weaker lights where it is rendered help, of a "
+                    "flat image also --map R=1e-12*R (G, B likewise, variance.R=1e-24*variance.R) with "
+                    "--drop-layers; --method mean, gaussian and paper take it as it is");
+}
 
 std::vector<std::string> furtherRadiance(const DumpHeader& header, const Drift& options) {
     std::vector<std::string> names, further;
@@ -236,11 +267,15 @@ GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const
         taken.clear();
         for (std::size_t s = band.offsets[pixel]; s < band.offsets[pixel + 1]; ++s) {
             ++counts.samples;
-            if (usable(band, layout, 0, s))
+            if (usable(band, layout, 0, s)) {
                 taken.push_back(s);
-            else
-                ++counts.dropped;
+                continue;
+            }
+            ++counts.dropped;
+            if (const float most = greatestRadiance(band, layout, s); std::isfinite(most))
+                counts.range.add({1, 1, most});
         }
+        counts.range.finite += static_cast<std::int64_t>(taken.size());
         halves[0].clear();
         halves[1].clear();
         if (layout.replicate >= 0)

@@ -54,8 +54,25 @@ inline float saturated(float value) {
     return magnitude > 1 ? std::copysign(1 + std::log(magnitude), value) : value;
 }
 
+/// Radiance of which floats hold sums of squares; no light is as bright.
+inline constexpr float kMostRadiance = 0x1p50f;
+
+/// How many samples have radiance beyond kMostRadiance. A few are fireflies, and left out like those that are
+/// not finite. More are the picture itself, in a unit that is too small: what is left is no picture.
+struct RadianceRange {
+    std::int64_t finite = 0, beyond = 0;  ///< samples, of which those are beyond
+    float most = 0;                       ///< the greatest magnitude of those
+
+    void add(const RadianceRange& other);
+    /// More than 16 samples, and more than 1 in 1000, are beyond.
+    bool exceeded() const;
+    /// Throws Error when it is exceeded. `where`: of which rows.
+    void require(const std::string& path, const std::string& where) const;
+};
+
 struct GatherCounts {
     std::int64_t samples = 0, dropped = 0, empty = 0;
+    RadianceRange range;
     std::int64_t limited = 0;           ///< samples made darker by the firefly estimator
     double luminance = 0, removed = 0;  ///< sums over samples; nothing is darker than black
     double light = 0;                   ///< the same sum of what may be negative, too
@@ -70,7 +87,7 @@ struct GatherCounts {
 /// not alike, and may lie on different sides of the pixel. Single samples belong to A and B by turns along a
 /// row, starting with A or B by turns from row to row: a chessboard where every pixel has one. Samples with
 /// known error variances (kVarianceChannels) stand for their own scatter. A sample with radiance that is not
-/// finite, or beyond 2^50, whose squares floats do not hold, is dropped; other values that are not finite
+/// finite, or beyond kMostRadiance, is dropped; other values that are not finite
 /// count as 0. Features are saturated(feature / scale), sample by sample. Sums run in double precision about
 /// the pixel's first sample. A `clamp` above 0 limits the luminance of each sample.
 GatherCounts gatherRow(const SampleBand& band, const SampleLayout& layout, const GatheredPlanes& planes,

@@ -12,6 +12,7 @@ namespace vlx {
 /// What was found in the rows that are the reconstruction's own.
 struct FrameCounts {
     std::int64_t samples = 0, dropped = 0, empty = 0;
+    RadianceRange range;
     std::int64_t limited = 0;    ///< samples made darker as fireflies
     std::int64_t farPixels = 0;  ///< without samples within kHoleReach
     double luminance = 0, removed = 0;

@@ -6,6 +6,7 @@
 
 #include "reconstruct/common/rebin.h"
 #include "variolux/base/error.h"
+#include "variolux/base/memory.h"
 #include "variolux/base/parallel.h"
 #include "variolux/geostat/random_drift.h"
 
@@ -80,9 +81,8 @@ void SampledFrame::readWithin(std::uint64_t most, std::uint64_t held) {
     readRows_ = kReadRows / options_.scale;
     while (readRows_ > 1 && needed(readRows_) > most) --readRows_;
     if (needed(readRows_) > most)
-        throw Error(dump_.path(), "expected a memory limit of at least " +
-                                      std::to_string((needed(readRows_) + 999'999) / 1'000'000) +
-                                      "M for rows as wide and full as these, found " +
+        throw Error(dump_.path(), "expected a memory limit of at least " + memoryLimitFor(needed(readRows_)) +
+                                      " for rows as wide and full as these, found " +
                                       std::to_string(most / 1'000'000) + "M");
 }
 
@@ -111,6 +111,7 @@ void SampledFrame::gather(int until) {
             counts_.samples += of.samples;
             counts_.dropped += of.dropped;
             counts_.empty += of.empty;
+            counts_.range.add(of.range);
             counts_.limited += of.limited;
             counts_.luminance += of.luminance;
             counts_.removed += of.removed;

@@ -94,6 +94,7 @@ class FrameKriging::Stages {
             if (progress) progress(finishedRows_ - firstRow_, endRow_ - firstRow_);
         }
         const FrameCounts& counts = frame_.counts();
+        counts.range.require(path_, "of the picture");
         report_.samples = counts.samples;
         report_.droppedSamples = counts.dropped;
         report_.emptyPixels = counts.empty;

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "reconstruct/common/picture_scale.h"
 #include "reconstruct/common/window_sum.h"
 #include "reconstruct/opinion/evidence.h"
 #include "variolux/base/error.h"
@@ -351,6 +352,7 @@ ReconstructionReport reconstructWithOpinion(const SampleSource& source, const Dr
         if (image && (image->data != picture || image->channelCount() != 3))
             throw Error(source.path(),
                         "expected another denoiser's image of R, G, B over the samples' window");
+    measurePictureScale(source, chooseSampleLayout(source, options));  // throws on radiance that is too much
     const std::uint64_t planes = 9 + 13 + 1;  // SampleMeans, what the image differs by, evidence
     requireMemory(source.path(), imageBytes(picture, planes), "another denoiser's image beside the means");
 

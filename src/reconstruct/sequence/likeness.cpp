@@ -90,6 +90,7 @@ void Likeness::fill(int end) {
 
 float Likeness::featureWeight(int x, int y, std::size_t k, int column, int row) const {
     const auto w = static_cast<std::size_t>(width_);
+    if (layout_.features == 0) return 1;  // there are no rows of them
     const float* const mine = frame_.frame().fine().features().row(0, y) + x;
     const float* const theirs = neighbour(k).frame->frame().fine().features().row(0, row) + column;
     const std::vector<float>& scale = neighbour(k).frame->frame().layout().scale;
@@ -200,7 +201,7 @@ void Likeness::compareRow(int y, std::size_t k, const std::vector<float>& places
             out(ApartPlanes::difference(half))[x] = std::clamp(difference / deviation, -kWild, kWild);
             out(ApartPlanes::known(half))[x] = 1;
         }
-        const float* const fa = at(own.features(), y, x);
+        const float* const fa = layout_.features > 0 ? at(own.features(), y, x) : nullptr;
         const std::array<Corner, 4> corners = cornersOf(place[0], place[1], width_, height_);
         float squares = 0, noise = 0, sum = kLeastSquare;
         for (int f = 0; f < layout_.features; ++f) {

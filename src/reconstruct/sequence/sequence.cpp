@@ -25,6 +25,7 @@ struct LoadedFrame {
         samples.own(first, first + outline.data.height);
         requireFrames(options, held);
         samples.frame().fillAll();
+        samples.frame().counts().range.require(source->path(), "of the picture");
     }
 
     /// That as many as are held at a time fit into memory, with the stages of one that is kriged and the
@@ -43,9 +44,9 @@ struct LoadedFrame {
         // What frames before it hold is in `rows` and resident.
         const std::uint64_t bytes = rows + bytesBesideRows() - std::min(held, rows);
         if (bytes > options.maxMemory)
-            throw Error(source->path(), "expected a memory limit of at least " +
-                                            std::to_string((bytes + 999'999) / 1'000'000) + "M for " + what +
-                                            ", found " + std::to_string(options.maxMemory / 1'000'000) + "M");
+            throw Error(source->path(), "expected a memory limit of at least " + memoryLimitFor(bytes) +
+                                            " for " + what + ", found " +
+                                            std::to_string(options.maxMemory / 1'000'000) + "M");
         samples.readWithin(options.maxMemory, bytes);
     }
 

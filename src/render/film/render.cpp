@@ -93,6 +93,7 @@ DumpHeader headerOf(const Scene& scene, const View& view, const RenderOptions& o
             leftOut += (leftOut.empty() ? "" : ",") + std::string(nameOf(e.effect));
     if (!leftOut.empty()) header.extra["effectsLeftOut"] = leftOut;
     if (!options.inputs.empty()) header.extra[kInputsAttribute] = options.inputs;
+    if (!options.picture.empty()) header.extra[kPictureAttribute] = options.picture;
     header.seed = static_cast<std::int64_t>(options.seed);
     if (!options.hierarchical) header.samples = options.spp;
     if (options.earlier != nullptr) {

@@ -35,6 +35,7 @@ struct RenderOptions {
     DumpCompression compression = DumpCompression::Rle;
     std::string version;       ///< of the program, for the header
     std::string inputs;        ///< for the header's kInputsAttribute (base/fingerprint.h)
+    std::string picture;       ///< for its kPictureAttribute (append.h)
     std::optional<Plan> plan;  ///< set by follow()
 
     /// Adopts a plan, which applyPlan is to apply to the scene too.

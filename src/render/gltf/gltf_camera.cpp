@@ -71,8 +71,8 @@ Camera readCamera(const GltfFile& file, const tinygltf::Node& node, const Transf
     const auto place = rigid(toWorld);
     if (!place)
         camera.unusable = "its transform has no inverse";
-    else if (!isFinite(place->point({0, 0, 0})))
-        camera.unusable = "it is further away than 32-bit floats reach";
+    else if (!(maxComponent(absolute(place->point({0, 0, 0}))) <= kFarthest))
+        camera.unusable = std::string("it is more than ") + kFarthestText + " from the origin";
     camera.toWorld = place.value_or(Transform{});
     camera.motion.cause = motion.cause;
     for (const Transform& at : motion.places) {

@@ -93,7 +93,9 @@ bool keepEncoded(tinygltf::Image* image, int, std::string*, std::string*, int, i
 std::string firstLine(const std::string& text) {
     const std::size_t begin = text.find_first_not_of(" \n\r\t");
     if (begin == std::string::npos) return "not a glTF 2.0 file";
-    return text.substr(begin, text.find_first_of("\n\r", begin) - begin);
+    std::string line = text.substr(begin, text.find_first_of("\n\r", begin) - begin);
+    if (line.size() > 200) line = line.substr(0, 197) + "...";  // some hold data
+    return line;
 }
 
 double component(const unsigned char* bytes, int type, bool normalized) {

@@ -14,10 +14,6 @@
 
 namespace vlx::render {
 
-/// From the origin along an axis, metres: a triangle's squared area is a float still.
-inline constexpr float kFarthest = 1e9f;
-inline constexpr const char* kFarthestText = "1e9 m";
-
 /// A parsed glTF file. Its JSON is checked first (check/gltf_check.h), the bytes that references lead to when
 /// they are followed: tinygltf does neither.
 class GltfFile {

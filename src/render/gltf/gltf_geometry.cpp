@@ -252,10 +252,13 @@ void GeometryReader::readPrimitive(std::size_t mesh, std::size_t index, const Us
     }
     readFurtherUvs(primitive, shape, what);
     if (!colours.empty()) {
+        if (std::ranges::any_of(colours, [](float v) { return !(v >= 0); }))
+            scene_.report.warnings.push_back(what + ": COLOR_0 has values below 0: 0 is taken");
         shape.firstColour = static_cast<std::int64_t>(scene_.colours.size());
         for (std::size_t i = 0; i < count; ++i) {
             const float* c = &colours[4 * i];
-            scene_.colours.push_back({{c[0], c[1], c[2]}, c[3]});
+            const auto part = [&](std::size_t k) { return std::max(0.f, c[k]); };
+            scene_.colours.push_back({{part(0), part(1), part(2)}, part(3)});
         }
     }
     if (blocks.size() > 1) {

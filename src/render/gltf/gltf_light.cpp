@@ -82,7 +82,7 @@ std::optional<Light> LightReader::read(int index, const tinygltf::Node& node, co
                   static_cast<float>(source.color[2])};
     light.intensity = colour * static_cast<float>(source.intensity / lumensPerWatt_);
     if (!isFinite(light.intensity) || light.intensity.x < 0 || light.intensity.y < 0 || light.intensity.z < 0)
-        file_.fail(what + ": the light's intensity must be finite and >= 0");
+        file_.fail(what + ": the light's color times its intensity must be finite and >= 0");
     if (isBlack(light.intensity)) {
         warnings.push_back(what + ": the light has no power");
         return std::nullopt;

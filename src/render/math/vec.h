@@ -54,6 +54,11 @@ inline bool isFinite(const Vec3& a) { return std::isfinite(a.x) && std::isfinite
 constexpr float luminance(const Rgb& c) { return vlx::luminance(c.x, c.y, c.z); }
 constexpr float square(float v) { return v * v; }
 
+/// What is in a scene lies no further from the origin along an axis, metres: a triangle's squared area is a
+/// float still.
+inline constexpr float kFarthest = 1e9f;
+inline constexpr const char* kFarthestText = "1e9 m";
+
 /// Two numbers in [0, 1), or two texture coordinates.
 struct Vec2 {
     float x = 0;

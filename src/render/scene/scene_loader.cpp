@@ -52,7 +52,8 @@ class Loader {
         readNodes(placed, choices.lightUnits);
         readEnvironment(environment);
         if (scene_.shapes.empty() && !scene_.environment)
-            file_.fail("has no triangles and no environment (give one with --env-constant or --env)");
+            file_.fail("has no triangles" + whyEmpty() +
+                       " and no environment (give one with --env-constant or --env)");
         completeScene(scene_);
         const float reach =
             std::max(maxComponent(absolute(scene_.boundsMin)), maxComponent(absolute(scene_.boundsMax)));
@@ -78,6 +79,14 @@ class Loader {
 
   private:
     void warn(const std::string& text) { scene_.report.warnings.push_back(text); }
+
+    /// What became of the triangles, where a message would otherwise leave one wondering.
+    std::string whyEmpty() const {
+        const auto& report = scene_.report;
+        if (report.degenerateTriangles > 0)
+            return " but " + std::to_string(report.degenerateTriangles) + " without area";
+        return report.warnings.empty() ? "" : " (" + report.warnings.front() + ")";
+    }
 
     void checkExtensions() {
         for (const std::string& name : model_.extensionsUsed)

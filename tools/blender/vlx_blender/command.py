@@ -17,8 +17,10 @@ from .processes import Children, Programs
 from .shot import Options, Shot, kept_name, named
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-OWN = {"-o", "--output", "--template", "--drop-layers", "--frames", "--temporal", "--radiance", "--json", "--log", "--overwrite",
-       "-q", "--quiet", "--threads"}  # of vlx-krige's options those that are set here
+MOST_IMAGES = 64  # --max-images, where it is not given
+# Of vlx-krige's options those that are set here: those that vlx-blender has as well, and the others.
+OWN = {"-o", "--output", "--frames", "--temporal", "--log", "--overwrite", "-q", "--quiet", "--threads"}
+SET = {"--template", "--drop-layers", "--radiance", "--json"}
 WITHOUT = {"--band", "--scale", "--max-memory", "--assess", "--diagnostics"}  # those that go without the layers of Blender's file
 FLAT = {"--preset", "--variance-is", "--variance-of", "--variance", "--albedo", "--normal", "--depth", "--samples"}  # of flat images
 
@@ -50,6 +52,13 @@ class Parser(argparse.ArgumentParser):
         raise Usage(message)
 
 
+def given(text):
+    """Most likely a variable of the shell that is not set: it must not pass for an option that was not given."""
+    if not text:
+        raise argparse.ArgumentTypeError("expected a value, found an empty one")
+    return text
+
+
 def whole(least, most):
     def check(text):
         if not text.isdigit() or not least <= int(text) <= most:
@@ -73,18 +82,18 @@ def parser():
     p = Parser("vlx-blender", usage="vlx-blender SCENE.blend -o OUTPUT [options] [-- options of vlx-krige]", description=DESCRIPTION,
                epilog=FOOTER, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, add_help=False)
     add = p.add_argument
-    add("scene", metavar="SCENE.blend", help="The Blender file, of Blender 3.4 or later")
-    add("-o", "--output", metavar="OUTPUT", required=True, help="OpenEXR picture to write; #### stands for the frame's number")
-    add("--frames", metavar="LIST", help="Frames, for example 1-100x2,150 (default: the file's frames if OUTPUT has ####, else its current one)")
+    add("scene", type=given, metavar="SCENE.blend", help="The Blender file, of Blender 3.4 or later")
+    add("-o", "--output", type=given, metavar="OUTPUT", required=True, help="OpenEXR picture to write; #### stands for the frame's number")
+    add("--frames", type=given, metavar="LIST", help="Frames, for example 1-100x2,150; negative ones are not possible (default: the file's frames if OUTPUT has ####, else its current one)")
     add("--images", type=whole(2, 4096), default=4, metavar="N", help="Images that a frame is rendered as. Their differences tell how noisy a pixel is")
     add("--spp", type=whole(1, 65536), default=4, metavar="N", help="Samples a pixel of each image")
     add("--target-error", type=relative_error, metavar="relmse=X", help="Render more images of a frame until its predicted relMSE is X or less")
-    add("--max-images", type=whole(2, 4096), default=64, metavar="N", help="With --target-error: images of a frame at most. One that has not got there is written all the same, and told")
+    add("--max-images", type=whole(2, 4096), metavar="N", help=f"With --target-error: images of a frame at most. One that has not got there is written all the same, and told (default: {MOST_IMAGES})")
     add("--temporal", type=whole(0, 8), default=0, metavar="N", help="Data of N frames before and N after add to each frame, moved by Blender's motion vectors. Best without motion blur, with which Blender writes none")
     add("--engine", choices=["CYCLES"], help="Render with Cycles a file that is set to another engine, which is else refused")
-    add("--view-layer", metavar="NAME", help="The view layer to render (default: the first one that is rendered)")
-    add("--keep-samples", metavar="FOLDER", help="Keep the samples of each frame in this folder, which is made if need be, as samples_OUTPUT, for vlx-krige")
-    add("--blender", metavar="PATH", default="blender", help="Blender's program")
+    add("--view-layer", type=given, metavar="NAME", help="The view layer to render (default: the first one that is rendered)")
+    add("--keep-samples", type=given, metavar="FOLDER", help="Keep the samples of each frame in this folder, which is made if need be, as samples_OUTPUT, for vlx-krige")
+    add("--blender", type=given, metavar="PATH", default="blender", help="Blender's program")
     add("--threads", type=whole(0, 1024), default=0, metavar="N", help="Of Blender and of vlx-krige, which run at the same time. 0: all processors")
     add("--overwrite", action="store_true", help="Render frames even if their pictures are there and were made by these programs from the same file with the same options, which are else skipped. Textures and linked files are not looked at")
     add("--log", choices=["text", "json", "openjd"], default="text", help="Progress for people, as lines of JSON on standard error, or as Open Job Description's lines on standard output")
@@ -103,7 +112,9 @@ def check(o, krige):
     for word in krige:
         name = word.split("=")[0]
         if name in OWN:
-            raise Usage(f"{name}: expected before --, or not at all: vlx-blender gives it to vlx-krige itself")
+            raise Usage(f"{name}: give it before --")
+        if name in SET:
+            raise Usage(f"{name}: not with vlx-blender")
         if name in WITHOUT:
             raise Usage(f"{name}: goes without the layers of Blender's file, which pictures keep: use --keep-samples, then vlx-krige")
         if name in FLAT:
@@ -117,7 +128,10 @@ def check(o, krige):
         check_frames(o, frames.parse(o.frames))
     if not frames.has_place(o.output):
         check_place(o.output)
-    if o.max_images < o.images:
+    if o.max_images and not o.target_error:
+        raise Usage("--max-images: only with --target-error; here nothing reads it")
+    o.max_images = o.max_images or MOST_IMAGES
+    if o.target_error and o.max_images < o.images:
         raise Usage(f"--max-images: expected at least --images, {o.images}, found {o.max_images}")
     check_scene_file(o.scene)
     folder = os.path.dirname(o.output) or "."

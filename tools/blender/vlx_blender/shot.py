@@ -214,6 +214,8 @@ class Shot:
             self.missed.append(frame.number)
             self.log.warn(f"WARNING: frame {frame.number}: relMSE {error:.3g} with {frame.images * self.options.samples} samples a "
                           f"pixel, wanted {self.options.target:g} (--max-images)")
+        if report.get("light") == 0:  # vlx-krige says so in words, which --json takes the place of
+            self.log.say(f"frame {frame.number}: no sample has light")
         self.hand_over(frame, error)
 
     def enough(self, images, error):

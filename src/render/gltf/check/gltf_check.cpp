@@ -157,17 +157,24 @@ class Checker {
                     fail(where, "a whole number of 0 to " + std::to_string(rule.size - 1), value);
                 return;
             case Number:
+            case Positive:
             case Unit:
                 if (!value.is_number()) fail(where, "a number", value);
+                if (rule.kind == Positive && value.get<double>() < 0)
+                    doubt(where, "0 or more", value, "the nearest is taken");
                 if (rule.kind == Unit && !isUnit(value))
                     doubt(where, "0 to 1", value, "the nearest is taken");
                 return;
             case Numbers:
+            case Positives:
             case Units:
             case Quaternion:
                 if (!value.is_array() || value.size() != rule.size ||
                     !std::ranges::all_of(value, [](const Json& v) { return v.is_number(); }))
                     fail(where, std::to_string(rule.size) + " numbers", value);
+                if (rule.kind == Positives &&
+                    !std::ranges::all_of(value, [](const Json& v) { return v.get<double>() >= 0; }))
+                    doubt(where, "numbers of 0 or more", value, "the nearest are taken");
                 if (rule.kind == Units && !std::ranges::all_of(value, isUnit))
                     doubt(where, "numbers from 0 to 1", value, "the nearest are taken");
                 if (rule.kind == Quaternion && !hasUnitLength(value))
@@ -256,6 +263,9 @@ class Checker {
 }  // namespace
 
 GltfFacts checkGltf(const std::string& file, const std::string& text) {
+    if (isNestedTooDeep(text))
+        throw Error(file, "expected arrays and objects in each other up to " + std::to_string(kDeepest) +
+                              " deep, found deeper ones");
     try {
         const Json root = Json::parse(text);
         Checker checker(file, root);

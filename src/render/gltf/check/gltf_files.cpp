@@ -30,31 +30,31 @@ std::string decoded(const std::string& uri) {
     return text;
 }
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-void keepOnly(Json& object, std::initializer_list<const char*> keys) {
+void keepOnly(OrderedJson& object, std::initializer_list<const char*> keys) {
     for (auto item = object.begin(); item != object.end();)
         item = std::ranges::find(keys, item.key()) == keys.end() ? object.erase(item) : std::next(item);
 }
 
 /// An array of an object, or an empty one.
-const Json& listOf(const Json& object, const char* key) {
-    static const Json none = Json::array();
+const OrderedJson& listOf(const OrderedJson& object, const char* key) {
+    static const OrderedJson none = OrderedJson::array();
     if (!object.is_object()) return none;
     const auto found = object.find(key);
     return found != object.end() && found->is_array() ? *found : none;
 }
 
-std::optional<std::size_t> indexOf(const Json& object, const char* key) {
+std::optional<std::size_t> indexOf(const OrderedJson& object, const char* key) {
     if (!object.is_object() || !object.contains(key) || !object[key].is_number_unsigned()) return {};
     return object[key].get<std::size_t>();
 }
 
 /// The nodes that have cameras, and all above them.
-std::set<std::size_t> cameraNodes(const Json& nodes) {
+std::set<std::size_t> cameraNodes(const OrderedJson& nodes) {
     std::map<std::size_t, std::size_t> parents;
     for (std::size_t i = 0; i < nodes.size(); ++i)
-        for (const Json& child : listOf(nodes[i], "children"))
+        for (const OrderedJson& child : listOf(nodes[i], "children"))
             if (child.is_number_unsigned()) parents[child.get<std::size_t>()] = i;
     std::set<std::size_t> found;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -66,11 +66,11 @@ std::set<std::size_t> cameraNodes(const Json& nodes) {
 }
 
 /// Leaves the channels that move one of the nodes, and the animations that have any.
-Json animationsOf(const Json& animations, const std::set<std::size_t>& nodes) {
-    Json kept = Json::array();
-    for (Json animation : animations) {
-        Json channels = Json::array();
-        for (const Json& channel : listOf(animation, "channels"))
+OrderedJson animationsOf(const OrderedJson& animations, const std::set<std::size_t>& nodes) {
+    OrderedJson kept = OrderedJson::array();
+    for (OrderedJson animation : animations) {
+        OrderedJson channels = OrderedJson::array();
+        for (const OrderedJson& channel : listOf(animation, "channels"))
             if (channel.is_object() && channel.contains("target"))
                 if (const auto node = indexOf(channel["target"], "node"); node && nodes.contains(*node))
                     channels.push_back(channel);
@@ -106,9 +106,11 @@ std::string gltfJson(const std::string& path) {
 }
 
 std::string camerasAlone(const std::string& json) {
-    Json file = Json::parse(json, nullptr, false);
+    if (isNestedTooDeep(json)) return {};
+    OrderedJson file = OrderedJson::parse(json, nullptr, false);
     if (!file.is_object()) return {};
-    const Json animations = animationsOf(listOf(file, "animations"), cameraNodes(listOf(file, "nodes")));
+    const OrderedJson animations =
+        animationsOf(listOf(file, "animations"), cameraNodes(listOf(file, "nodes")));
     if (animations.empty()) {
         keepOnly(file, {"asset", "scene", "scenes", "nodes", "cameras"});
     } else {
@@ -117,7 +119,7 @@ std::string camerasAlone(const std::string& json) {
         file["animations"] = animations;
     }
     if (file.contains("nodes") && file["nodes"].is_array())
-        for (Json& node : file["nodes"])
+        for (OrderedJson& node : file["nodes"])
             if (node.is_object())
                 keepOnly(node, {"name", "camera", "children", "matrix", "translation", "rotation", "scale",
                                 "extras"});
@@ -126,7 +128,9 @@ std::string camerasAlone(const std::string& json) {
 
 std::vector<std::string> gltfFiles(const std::string& path) {
     std::vector<std::string> files = {path};
-    const auto json = nlohmann::json::parse(gltfJson(path), nullptr, false);
+    const std::string text = gltfJson(path);
+    if (isNestedTooDeep(text)) return files;
+    const auto json = nlohmann::json::parse(text, nullptr, false);
     if (!json.is_object()) return files;
     const std::filesystem::path folder = std::filesystem::path(path).parent_path();
     for (const char* kind : {"buffers", "images"}) {
@@ -135,8 +139,8 @@ std::vector<std::string> gltfFiles(const std::string& path) {
         for (const auto& item : *list) {
             const auto uri = item.is_object() ? item.find("uri") : item.end();
             if (!item.is_object() || uri == item.end() || !uri->is_string()) continue;
-            const auto text = uri->get<std::string>();
-            if (!text.starts_with("data:")) files.push_back((folder / decoded(text)).string());
+            const auto name = uri->get<std::string>();
+            if (!name.starts_with("data:")) files.push_back((folder / decoded(name)).string());
         }
     }
     return files;
@@ -156,27 +160,65 @@ std::string kindOf(const std::filesystem::file_status& status) {
     }
 }
 
+bool isNestedTooDeep(const std::string& json) {
+    int depth = 0;
+    bool quoted = false;
+    for (std::size_t i = 0; i < json.size(); ++i) {
+        const char c = json[i];
+        if (quoted && c == '\\')
+            ++i;
+        else if (c == '"')
+            quoted = !quoted;
+        else if (!quoted && (c == '[' || c == '{') && ++depth > kDeepest)
+            return true;
+        else if (!quoted && (c == ']' || c == '}'))
+            --depth;
+    }
+    return false;
+}
+
+namespace {
+
+void checkData(const std::string& path, const std::string& where, const std::string& uri,
+               std::uint64_t byteLength) {
+    constexpr std::array kinds{"data:application/octet-stream;base64,",
+                               "data:application/gltf-buffer;base64,", "data:text/plain;base64,"};
+    if (std::ranges::none_of(kinds, [&](const char* kind) { return uri.starts_with(kind); }))
+        throw Error(path, where + ": expected data:application/octet-stream;base64, found " +
+                              uri.substr(0, std::min<std::size_t>(uri.find(','), 60)));
+    const std::string_view digits = std::string_view(uri).substr(uri.find(',') + 1);
+    const std::size_t bytes = (digits.find_last_not_of('=') + 1) * 3 / 4;
+    if (bytes != byteLength)
+        throw Error(path, where + ": expected " + std::to_string(byteLength) +
+                              " bytes (its byteLength), found " + std::to_string(bytes));
+}
+
+}  // namespace
+
 void checkGltfFiles(const std::string& path, const nlohmann::json& root) {
-    const auto buffers = root.find("buffers");
-    if (buffers == root.end()) return;
-    for (std::size_t i = 0; i < buffers->size(); ++i) {
-        const auto uri = (*buffers)[i].find("uri");
-        if (uri == (*buffers)[i].end()) continue;
-        const auto text = uri->get<std::string>();
-        const std::string where = "buffers[" + std::to_string(i) + "].uri";
-        if (text.starts_with("data:")) {
-            constexpr std::array kinds{"data:application/octet-stream;base64,",
-                                       "data:application/gltf-buffer;base64,", "data:text/plain;base64,"};
-            if (std::ranges::none_of(kinds, [&](const char* kind) { return text.starts_with(kind); }))
-                throw Error(path, where + ": expected data:application/octet-stream;base64, found " +
-                                      text.substr(0, std::min<std::size_t>(text.find(','), 60)));
-            continue;
+    for (const char* kind : {"buffers", "images"}) {
+        const auto list = root.find(kind);
+        if (list == root.end()) continue;
+        const bool buffers = kind[0] == 'b';
+        for (std::size_t i = 0; i < list->size(); ++i) {
+            const auto& item = (*list)[i];
+            const auto uri = item.find("uri");
+            if (uri == item.end()) continue;
+            const auto text = uri->get<std::string>();
+            const std::string where = std::string(kind) + "[" + std::to_string(i) + "].uri";
+            if (text.starts_with("data:")) {
+                if (buffers) checkData(path, where, text, item.value("byteLength", std::uint64_t{0}));
+                continue;
+            }
+            std::error_code ignored;
+            const std::filesystem::path file = std::filesystem::path(path).parent_path() / decoded(text);
+            const std::filesystem::file_status status = std::filesystem::status(file, ignored);
+            if (std::filesystem::is_regular_file(status)) continue;
+            // Whoever shows an image that is not there says so; not all are shown.
+            if (buffers || std::filesystem::exists(status))
+                throw Error(path,
+                            where + ": expected a file beside it, '" + text + "', found " + kindOf(status));
         }
-        std::error_code ignored;
-        const std::filesystem::path file = std::filesystem::path(path).parent_path() / decoded(text);
-        const std::filesystem::file_status status = std::filesystem::status(file, ignored);
-        if (!std::filesystem::is_regular_file(status))
-            throw Error(path, where + ": expected a file beside it, '" + text + "', found " + kindOf(status));
     }
 }
 

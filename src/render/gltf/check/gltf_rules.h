@@ -6,7 +6,7 @@
 
 namespace vlx::render {
 
-/// What a value must be. Of Unit, Units and Quaternion another type is an error, a value out of range a
+/// What a value must be. Of Unit to Quaternion another type is an error, a value out of range a
 /// warning: readers take the nearest that is in it.
 enum class RuleKind {
     Index,       ///< of an element of an array
@@ -15,6 +15,8 @@ enum class RuleKind {
     Numbers,     ///< an array of `size` of them
     Unit,        ///< a number in [0, 1]
     Units,       ///< an array of `size` of them
+    Positive,    ///< a number >= 0
+    Positives,   ///< an array of `size` of them
     Quaternion,  ///< four numbers, of length 1
     String,
     Word,  ///< one of a few
