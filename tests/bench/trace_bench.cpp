@@ -5,6 +5,8 @@
 
 #include <chrono>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "render/film/region_sampling.h"
 #include "render/integrator/integrator.h"
@@ -21,16 +23,23 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// One sample in each pixel.
+/// One sample in each pixel, in streams as large as a picture's (band_tracer.cpp).
 void trace(const Integrator& integrator) {
-    Rgb sum;
+    constexpr std::size_t kStream = 512;
+    std::vector<CameraSample> samples;
+    std::vector<PathSample> found(kStream);
     std::vector<Splat> splats;
+    const auto flush = [&] {
+        integrator.trace(samples, std::span(found).first(samples.size()), splats);
+        benchmark::DoNotOptimize(found.data());
+        samples.clear();
+    };
     sampleUniformly({0, 0, kSize, kSize}, 1, 1, 1, [&](const CameraSample& s) {
-        const Rgb v = integrator.trace(s, splats).radiance;
-        sum += v;
-        return v;
+        samples.push_back(s);
+        if (samples.size() == kStream) flush();
+        return Rgb{};
     });
-    benchmark::DoNotOptimize(sum);
+    flush();
 }
 
 void shoot(RTCScene scene, const std::vector<RecordedRay>& rays) {

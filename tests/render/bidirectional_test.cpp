@@ -110,7 +110,7 @@ Light pointLight(LightType type = LightType::Point) {
     l.type = type;
     l.intensity = {3, 2, 1};
     l.position = {0.1f, 1.6f, 0.2f};
-    l.direction = normalized({0.1f, -1, -0.2f});
+    l.direction = normalized(Vec3{0.1f, -1, -0.2f});
     if (type == LightType::Spot) {
         l.coneScale = 1 / (0.95f - 0.7f);
         l.coneOffset = -0.7f * l.coneScale;

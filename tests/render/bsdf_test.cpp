@@ -289,7 +289,7 @@ TEST(Bsdf, RoughGlassWithoutCompensationIsReciprocalAcrossTheBoundary) {
         s.transmission = 1;
         s.albedoTable = &table(1.5f);
         const Vec3 out = viewFrom(0.8f);
-        const Vec3 in = normalized({-0.2f, -0.3f, -0.9f});
+        const Vec3 in = normalized(Vec3{-0.2f, -0.3f, -0.9f});
         const Rgb outward = Bsdf(s, out, false, table(1.5f)).evaluate(in).value / std::abs(in.z);
         // From inside the frame is turned over.
         const Rgb inward =
@@ -326,11 +326,11 @@ TEST(Bsdf, RetroReflectingSurfacesFollowDisneysFormula) {
 }
 
 TEST(Fresnel, KnownValues) {
-    EXPECT_NEAR(dielectricFresnel(1, 1.5f), 0.04f, 1e-6f);
-    EXPECT_NEAR(dielectricFresnel(1, 1 / 1.5f), 0.04f, 1e-6f);
+    EXPECT_NEAR(dielectricFresnel(1.f, 1.5f), 0.04f, 1e-6f);
+    EXPECT_NEAR(dielectricFresnel(1.f, 1 / 1.5f), 0.04f, 1e-6f);
     EXPECT_FLOAT_EQ(dielectricFresnel(0.5f, 1 / 1.5f), 1);  // beyond the critical angle of 41.8 degrees
     EXPECT_NEAR(dielectricFresnel(std::cos(std::atan(1.5f)), 1.5f), 0.0740f, 1e-4f);  // Brewster: s only
-    EXPECT_NEAR(dielectricFresnel(0.3f, 1), 0, 1e-12f);
+    EXPECT_NEAR(dielectricFresnel(0.3f, 1.f), 0, 1e-12f);
 }
 
 TEST(Refraction, ObeysSnell) {

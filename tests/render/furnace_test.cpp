@@ -142,7 +142,7 @@ TextureRef waves(TestScene& t, float tilt) {
         for (int x = 0; x < n; ++x) {
             const auto at = [](int i) { return std::sin(2 * kPi * (static_cast<float>(i) + 0.5f) / n); };
             const float r = std::tan(tilt) * std::numbers::sqrt2_v<float> / 2;
-            const Vec3 v = normalized({r * at(x), r * at(y), 1});
+            const Vec3 v = normalized(Vec3{r * at(x), r * at(y), 1});
             texels.insert(texels.end(), {0.5f + 0.5f * v.x, 0.5f + 0.5f * v.y, 0.5f + 0.5f * v.z, 1});
         }
     t.scene().textures.emplace_back(n, n, texels, ColourSpace::Linear);

@@ -80,7 +80,7 @@ TEST(Skins, NormalsGoWithTheJointsEvenWhereTheseScale) {
     for (const std::size_t joint : {3u, 4u}) g.json["nodes"][joint]["scale"] = {1, 2, 1};
     const Scene s = loadBent(g);
     ASSERT_EQ(s.vertices.size(), 4u);
-    const Vec3 wanted = normalized({0, 0.3f, 0.8f});  // by the inverse transpose
+    const Vec3 wanted = normalized(Vec3{0, 0.3f, 0.8f});  // by the inverse transpose
     for (const Vertex& v : s.vertices) EXPECT_NEAR(length(v.normal - wanted), 0, 1e-6f);
     EXPECT_EQ(s.boundsMax, (Vec3{1, 2, 0}));
 }
@@ -203,8 +203,8 @@ TEST(Morphs, NormalsAndTangentsAreMorphedToo) {
     primitive["targets"][0]["TANGENT"] = g.floats({-1, 0, -1, -1, 0, -1, -1, 0, -1, -1, 0, -1}, "VEC3");
     g.json["meshes"][0]["weights"] = {0.5};
     const Scene s = loadBent(g);
-    EXPECT_NEAR(length(s.vertices[0].normal - normalized({1, 0, 1})), 0, 1e-6f);
-    EXPECT_NEAR(length(s.tangents[0].direction - normalized({1, 0, -1})), 0, 1e-6f);
+    EXPECT_NEAR(length(s.vertices[0].normal - normalized(Vec3{1, 0, 1})), 0, 1e-6f);
+    EXPECT_NEAR(length(s.tangents[0].direction - normalized(Vec3{1, 0, -1})), 0, 1e-6f);
 }
 
 TEST(Morphs, ThatStandStillAreInstancedAndMayShine) {

@@ -66,24 +66,24 @@ TEST(LightTree, ChoosesAsOftenAsItSays) {
         EXPECT_NEAR(counts[i] / static_cast<double>(n), tree.probability(lights, receiver, i), 1e-3) << i;
 }
 
-TEST(LightQuad, EstimatesWhatTheSingleLightsDo) {
+TEST(LightImportance, OfFourReceiversIsThatOfEachBitForBit) {
     auto lights = manyLights(64);
     lights[8].type = LightType::Spot;
-    lights[8].direction = normalized({0.2f, -1, 0.1f});
+    lights[8].direction = normalized(Vec3{0.2f, -1, 0.1f});
     lights[8].coneScale = 3;
     lights[8].coneOffset = -2;
     lights[8].coneStep = 1;
-    for (const bool bothSides : {false, true}) {
-        const Receiver receiver{{0.3f, 0.5f, -0.2f}, normalized({0.3f, 1, 0.1f}), bothSides};
-        for (std::size_t i = 0; i + 4 <= lights.size(); i += 4) {
-            LightQuad quad;
-            for (std::size_t lane = 0; lane < 4; ++lane) quad.set(lane, lights[i + lane]);
-            const auto w = quad.importance(receiver);
-            for (std::size_t lane = 0; lane < 4; ++lane) {
-                const float single = lightImportance(receiver, lights[i + lane]);
-                EXPECT_NEAR(w[lane], single, 1e-4f * single + 1e-7f) << i + lane;
-            }
-        }
+    const Vec3 lamp = lights[0].position;
+    const std::array<Receiver, 4> receivers = {
+        Receiver{{0.3f, 0.5f, -0.2f}, normalized(Vec3{0.3f, 1, 0.1f}), false},
+        Receiver{{0.3f, 0.5f, -0.2f}, normalized(Vec3{0.3f, 1, 0.1f}), true},
+        Receiver{{-7, 0.1f, 2}, normalized(Vec3{0.3f, -1, 0.1f}), false}, Receiver{lamp, {0, 1, 0}, false}};
+    const ReceiverOf<Lanes> four = {vectorsOf([&](std::size_t i) { return receivers[i].position; }),
+                                    vectorsOf([&](std::size_t i) { return receivers[i].normal; }),
+                                    maskOf([&](std::size_t i) { return receivers[i].bothSides; })};
+    for (const LightCandidate& light : lights) {
+        const Lanes found = lightImportance(four, light);
+        for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(found[i], lightImportance(receivers[i], light)) << i;
     }
 }
 

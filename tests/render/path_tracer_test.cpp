@@ -42,7 +42,7 @@ TEST(ClosedBox, HasTheRadiosityOfAnInfiniteSeriesOfBounces) {
     PathOptions options;
     options.maxBounces = 200;
     const Estimate e =
-        estimate(scene, {{0.1f, 0.2f, 0.3f}, normalized({0.3f, -0.5f, 0.8f})}, kMany / 4, options);
+        estimate(scene, {{0.1f, 0.2f, 0.3f}, normalized(Vec3{0.3f, -0.5f, 0.8f})}, kMany / 4, options);
     expectRadiance(e, emission / (Rgb(1) - rho));
     EXPECT_LT(e.error[0], 0.02);
 }
@@ -57,7 +57,7 @@ TEST(ClosedBox, MaxBouncesCutsTheSeries) {
         term *= 0.5;
         PathOptions options;
         options.maxBounces = bounces;
-        expectRadiance(estimate(scene, {{0, 0, 0}, normalized({1, 0.3f, 0.2f})}, kFew, options),
+        expectRadiance(estimate(scene, {{0, 0, 0}, normalized(Vec3{1, 0.3f, 0.2f})}, kFew, options),
                        Rgb(static_cast<float>(series)));
     }
 }
@@ -123,7 +123,7 @@ TEST(DirectionalLight, GivesItsIrradianceTimesTheCosine) {
     floorBelow(t);
     Light light;
     light.type = LightType::Directional;
-    light.direction = normalized({1, -2, 0.5f});
+    light.direction = normalized(Vec3{1, -2, 0.5f});
     light.intensity = {2, 3, 4};
     t.light(light);
     expectRadiance(estimate(t.finish(), kDown, 100), lit(light.intensity * -light.direction.y));
@@ -254,10 +254,10 @@ TEST(Environment, ImageOrientation) {
         for (int x = 0; x < 8; ++x)
             pixels[static_cast<std::size_t>(y * 8 + x)] = {static_cast<float>(x), static_cast<float>(y), 0};
     const Environment env(8, 4, pixels);
-    EXPECT_EQ(env.radiance(normalized({0.1f, 0.1f, -1})), (Rgb{4, 1, 0}));
-    EXPECT_EQ(env.radiance(normalized({1, -0.1f, -0.1f})), (Rgb{5, 2, 0}));
-    EXPECT_EQ(env.radiance(normalized({-1, 0.1f, -0.1f})), (Rgb{2, 1, 0}));
-    EXPECT_EQ(env.radiance(normalized({0.01f, 1, 0})).y, 0);
+    EXPECT_EQ(env.radiance(normalized(Vec3{0.1f, 0.1f, -1})), (Rgb{4, 1, 0}));
+    EXPECT_EQ(env.radiance(normalized(Vec3{1, -0.1f, -0.1f})), (Rgb{5, 2, 0}));
+    EXPECT_EQ(env.radiance(normalized(Vec3{-1, 0.1f, -0.1f})), (Rgb{2, 1, 0}));
+    EXPECT_EQ(env.radiance(normalized(Vec3{0.01f, 1, 0})).y, 0);
 }
 
 /// A room with every kind of light and surface: the three strategies must agree.
@@ -319,7 +319,7 @@ TEST(Roulette, DoesNotChangeTheMean) {
     PathOptions options;
     options.maxBounces = 40;
     const double expected = (1 - std::pow(0.9f, 41)) / (1 - 0.9f);
-    expectRadiance(estimate(scene, {{0, 0, 0}, normalized({1, 0.2f, 0.1f})}, kMany / 4, options),
+    expectRadiance(estimate(scene, {{0, 0, 0}, normalized(Vec3{1, 0.2f, 0.1f})}, kMany / 4, options),
                    Rgb(static_cast<float>(expected)));
 }
 
@@ -344,7 +344,7 @@ TEST(WhiteFurnaceScene, ClosedSurfacesUnderAConstantSkyVanish) {
         const Scene scene = t.finish();
         PathOptions options;
         options.maxBounces = 100;
-        for (const Vec3& d : {Vec3{0, 0, -1}, normalized({-0.9f, -0.2f, -1})}) {
+        for (const Vec3& d : {Vec3{0, 0, -1}, normalized(Vec3{-0.9f, -0.2f, -1})}) {
             const Estimate e = estimate(scene, {{0.3f, 0.2f, 3}, d}, kFew, options);
             EXPECT_NEAR(e.mean[1], 1, kSigmas * e.error[1] + 0.01) << s.name;
         }

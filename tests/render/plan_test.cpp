@@ -619,7 +619,7 @@ TEST(SheenLobe, KeepsEnergyAndItsSamplesAgreeWithItsValues) {
         t.environment(render::Environment(Rgb(1)));
         const Scene scene = t.finish();
         PathOptions options;
-        for (const Vec3& d : {Vec3{0, 0, -1}, normalized({-0.9f, -0.2f, -0.5f})}) {
+        for (const Vec3& d : {Vec3{0, 0, -1}, normalized(Vec3{-0.9f, -0.2f, -0.5f})}) {
             std::vector<Estimate> results;
             for (const Strategy strategy : {Strategy::Mis, Strategy::BsdfOnly, Strategy::LightsOnly}) {
                 options.strategy = strategy;

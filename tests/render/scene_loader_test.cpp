@@ -229,7 +229,7 @@ TEST(LoadScene, NormalMapsTiltTheNormal) {
         }
         const Scene s = load(g);
         const Accelerator accelerator(s);
-        const Vec3 down = normalized({0, 0.5f, -1});
+        const Vec3 down = normalized(Vec3{0, 0.5f, -1});
         const auto hit = accelerator.intersect({{0.3f, -0.3f, 1}, down}, 0);
         ASSERT_TRUE(hit);
         const SurfacePoint p = surfaceAt(s, *hit, {0, -0.7f, -0.7f});
@@ -331,7 +331,7 @@ TEST(LoadScene, SpotDirectionalAndSphereLights) {
     ASSERT_EQ(s.lights.size(), 3u);
     EXPECT_EQ(s.lights[0].type, LightType::Spot);
     EXPECT_NEAR(s.lights[0].cone({0, 0, -1}), 1, 1e-6f);
-    EXPECT_EQ(s.lights[0].cone(normalized({0.6f, 0, -1})), 0);
+    EXPECT_EQ(s.lights[0].cone(normalized(Vec3{0.6f, 0, -1})), 0);
     EXPECT_EQ(s.lights[1].type, LightType::Directional);
     EXPECT_NEAR(s.lights[1].direction.y, -1, 1e-6f);
     EXPECT_EQ(s.lights[2].type, LightType::Sphere);

@@ -9,6 +9,9 @@
 namespace vlx::render {
 namespace {
 
+/// Paths that are traced together, at most: at some 600 bytes each they fit into a core's cache.
+constexpr std::size_t kStream = 512;
+
 /// The part of region (rx, ry) inside `window`.
 Window clipped(int rx, int ry, const Window& window) {
     const int x0 = std::max(rx * kRegionSize, window.x), y0 = std::max(ry * kRegionSize, window.y);
@@ -81,12 +84,30 @@ BandTracer::BandTracer(const Integrator& integrator, const RenderOptions& option
     firstReplicate_ = options.earlier->freeReplicate();
 }
 
+/// The regions that `rows` touch.
+struct BandTracer::Grid {
+    explicit Grid(const Window& traced)
+        : rows(traced),
+          firstX(traced.x / kRegionSize),
+          firstY(traced.y / kRegionSize),
+          across((traced.x + traced.width - 1) / kRegionSize - firstX + 1),
+          down((traced.y + traced.height - 1) / kRegionSize - firstY + 1) {}
+
+    std::size_t count() const { return static_cast<std::size_t>(across) * static_cast<std::size_t>(down); }
+    int columnOf(std::size_t region) const { return firstX + static_cast<int>(region) % across; }
+    int rowOf(std::size_t region) const { return firstY + static_cast<int>(region) / across; }
+    std::size_t at(const CameraSample& s) const {
+        return static_cast<std::size_t>((s.row / kRegionSize - firstY) * across +
+                                        (s.column / kRegionSize - firstX));
+    }
+
+    Window rows;
+    int firstX, firstY, across, down;
+};
+
 SampleBand BandTracer::trace(const Window& rows, const std::function<void(std::int64_t)>& regionDone) {
-    const int firstX = rows.x / kRegionSize, firstY = rows.y / kRegionSize;
-    const int across = (rows.x + rows.width - 1) / kRegionSize - firstX + 1;
-    const int down = (rows.y + rows.height - 1) / kRegionSize - firstY + 1;
-    regions_.resize(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
-    const auto count = static_cast<std::int64_t>(regions_.size());
+    const Grid grid(rows);
+    regions_.resize(grid.count());
     SampleBand band = bandOf(rows);
     // Where each pixel gets as many samples, their places are known and they go there at once.
     const bool even = !options_.hierarchical && options_.map == nullptr;
@@ -96,10 +117,14 @@ SampleBand BandTracer::trace(const Window& rows, const std::function<void(std::i
         allocate(band);
     }
     const ChannelArrays direct(band);
-    parallelFor(0, count, [&](std::int64_t i) {
-        const int rx = firstX + static_cast<int>(i % across), ry = firstY + static_cast<int>(i / across);
-        traceRegion(rx, ry, rows, regions_[static_cast<std::size_t>(i)], even ? &direct : nullptr);
-        regionDone(1);
+    const auto fill = kStream / (static_cast<std::size_t>(options_.spp) * kRegionSize * kRegionSize);
+    const std::size_t together = std::clamp<std::size_t>(fill, 1, 64);
+    const auto runs = static_cast<std::int64_t>((grid.count() + together - 1) / together);
+    parallelFor(0, runs, [&](std::int64_t i) {
+        const std::size_t first = static_cast<std::size_t>(i) * together;
+        const std::size_t end = std::min(first + together, grid.count());
+        traceRegions(grid, first, end, even ? &direct : nullptr);
+        regionDone(static_cast<std::int64_t>(end - first));
     });
     if (!even) gather(rows, band);
     return band;
@@ -141,38 +166,73 @@ void BandTracer::allocate(SampleBand& band) const {
     }
 }
 
-void BandTracer::traceRegion(int rx, int ry, const Window& rows, RegionResult& out,
-                             const ChannelArrays* direct) const {
-    out.window = clipped(rx, ry, rows);
-    out.records.clear();
-    out.counts.fill(0);
-    out.nonFinite = 0;
-    out.splats.clear();
+void BandTracer::traceRegions(const Grid& grid, std::size_t first, std::size_t end,
+                              const ChannelArrays* direct) {
+    std::vector<CameraSample> samples;
+    std::vector<PathSample> found;
     std::vector<Splat> splats;
-    const int left = rx * kRegionSize, top = ry * kRegionSize;
-    const Shade shade = [&](const CameraSample& s) {
-        PathSample sample = integrator_.trace(s, splats);
-        const bool outside = !rows.contains(s.column, s.row);  // of the band: another band's sample
-        for (const Splat& splat : splats)
-            out.splats.push_back({static_cast<int>(std::floor(splat.x)),
-                                  static_cast<int>(std::floor(splat.y)), s.replicate, splat.radiance});
+    const auto addSplats = [&] {
+        for (const Splat& splat : splats) {
+            const CameraSample& s = samples[splat.sample];
+            regions_[grid.at(s)].splats.push_back({static_cast<int>(std::floor(splat.x)),
+                                                   static_cast<int>(std::floor(splat.y)), s.replicate,
+                                                   splat.radiance});
+        }
         splats.clear();
-        if (!isFinite(sample.radiance)) {
-            out.nonFinite += !outside;
-            sample.radiance = {};
-        }
-        if (outside) return sample.radiance;
-        const int pixel = (s.row - top) * kRegionSize + (s.column - left);
-        const std::uint32_t number = out.counts[static_cast<std::size_t>(pixel)]++;
-        const Record record{pixel, s.x, s.y, s.replicate, sample};
-        if (direct == nullptr) {
-            out.records.push_back(record);
-        } else {
-            const std::int64_t place = std::int64_t{s.row - rows.y} * rows.width + (s.column - rows.x);
-            direct->put(static_cast<std::uint64_t>(place * options_.spp) + number, record);
-        }
-        return sample.radiance;
     };
+    const auto flush = [&] {
+        found.resize(samples.size());
+        integrator_.trace(samples, found, splats);
+        addSplats();
+        for (std::size_t i = 0; i < samples.size(); ++i) take(grid, samples[i], found[i], direct);
+        samples.clear();
+    };
+    const Shade atOnce = [&](const CameraSample& s) {
+        samples.assign(1, s);
+        const PathSample sample = integrator_.trace(s, splats);
+        addSplats();
+        return take(grid, s, sample, direct);
+    };
+    const Shade inStream = [&](const CameraSample& s) {
+        samples.push_back(s);
+        if (samples.size() == kStream) flush();
+        return Rgb{};
+    };
+    for (std::size_t i = first; i < end; ++i) {
+        RegionResult& out = regions_[i];
+        out.window = clipped(grid.columnOf(i), grid.rowOf(i), grid.rows);
+        out.records.clear();
+        out.counts.fill(0);
+        out.nonFinite = 0;
+        out.splats.clear();
+        sampleRegion(out, grid.columnOf(i), grid.rowOf(i), options_.hierarchical ? atOnce : inStream);
+    }
+    if (!options_.hierarchical) flush();
+}
+
+Rgb BandTracer::take(const Grid& grid, const CameraSample& s, PathSample sample,
+                     const ChannelArrays* direct) {
+    RegionResult& out = regions_[grid.at(s)];
+    const Window& rows = grid.rows;
+    const bool outside = !rows.contains(s.column, s.row);  // of the band: another band's sample
+    if (!isFinite(sample.radiance)) {
+        out.nonFinite += !outside;
+        sample.radiance = {};
+    }
+    if (outside) return sample.radiance;
+    const int pixel = s.row % kRegionSize * kRegionSize + s.column % kRegionSize;
+    const std::uint32_t number = out.counts[static_cast<std::size_t>(pixel)]++;
+    const Record record{pixel, s.x, s.y, s.replicate, sample};
+    if (direct == nullptr) {
+        out.records.push_back(record);
+    } else {
+        const std::int64_t place = std::int64_t{s.row - rows.y} * rows.width + (s.column - rows.x);
+        direct->put(static_cast<std::uint64_t>(place * options_.spp) + number, record);
+    }
+    return sample.radiance;
+}
+
+void BandTracer::sampleRegion(RegionResult& out, int rx, int ry, const Shade& shade) const {
     if (options_.hierarchical) {
         // All that the whole picture has of the region: it says where cells are refined.
         out.refined =

@@ -61,9 +61,13 @@ class BandTracer {
 
     SampleBand bandOf(const Window& rows) const;
     void allocate(SampleBand& band) const;
-    /// Into the region's records, or straight into the band.
-    void traceRegion(int rx, int ry, const Window& rows, RegionResult& out,
-                     const ChannelArrays* direct) const;
+    struct Grid;
+    /// Neighbouring regions, their samples in one stream: into the regions' records, or straight into the
+    /// band.
+    void traceRegions(const Grid& grid, std::size_t first, std::size_t end, const ChannelArrays* direct);
+    void sampleRegion(RegionResult& out, int rx, int ry, const Shade& shade) const;
+    /// Returns its radiance, 0 where that is not finite.
+    Rgb take(const Grid& grid, const CameraSample& s, PathSample sample, const ChannelArrays* direct);
     /// The regions' samples in the band's order: pixel by pixel, each pixel's in the order they were taken.
     void gather(const Window& rows, SampleBand& band) const;
 

@@ -48,6 +48,40 @@ struct EyePath {
     std::uint32_t raySeed() const { return seed + 2 * static_cast<std::uint32_t>(walk.bounces); }
 };
 
+/// Goes to the surface that the path has met and gathers what shines there; `shown` is what an unlit one
+/// shows. Returns whether there is more to the surface.
+template <class Estimator>
+bool meetSurface(EyePath& path, const Hit& hit, const SurfacePoint& point, Estimator& estimator, bool& emits,
+                 Rgb& shown) {
+    const PathContext& in = path.walk.in;
+    emits = point.material->emissive() && (path.mirrored || !point.material->unlit) &&
+            (!point.fromBehind || point.material->visibleFromBehind());
+    if (emits) {
+        const MetLight met = surfaceMet(in, hit, point, path.walk.ray.direction);
+        estimator.meet(path.walk, met);
+        shown = point.material->unlit ? met.radiance : Rgb(1);  // what shines is white among the features
+    }
+    return path.featuresPending || path.walk.bounces < in.options.maxBounces;
+}
+
+/// Notes the features of the first surface that is not perfectly smooth.
+inline void showFeatures(EyePath& path, const SurfacePoint& point, bool smoothLobe, bool emits,
+                         const Rgb& albedo) {
+    if (!path.featuresPending || !(smoothLobe || emits)) return;
+    path.featuresPending = false;
+    path.seen.normal = point.shadingNormal;
+    path.seen.albedo = albedo;
+}
+
+/// How a path goes on from a surface, once its estimator knows; see Walk::goOn.
+inline bool scattered(EyePath& path, const SurfacePoint& point, const Media& media, const BsdfSample& next,
+                      const Vec3& direction, float u) {
+    path.mirrored = path.mirrored && next.delta;
+    path.walk.throughput *= next.weight;
+    const float survival = std::min(1.f, maxComponent(path.walk.throughput));
+    return path.walk.goOn(point, media, next.through, direction, survival, u);
+}
+
 /// What happens where the path has met a surface that calls for the features `F` at most. Returns whether it
 /// goes on. `Estimator` gathers the radiance; it is told what the walk comes by:
 /// - meet(const Walk&, const MetLight&): light, where the walk is;
@@ -59,23 +93,13 @@ bool scatterAt(EyePath& path, const Hit& hit, const PathSampler& sampler, Estima
     Walk& walk = path.walk;
     const PathContext& in = walk.in;
     const SurfacePoint point = walk.arrive<F>(hit);
-    const bool emits = point.material->emissive() && (path.mirrored || !point.material->unlit) &&
-                       (!point.fromBehind || point.material->visibleFromBehind());
-    Rgb shown(1);  // what shines is white among the features
-    if (emits) {
-        const MetLight met = surfaceMet(in, hit, point, walk.ray.direction);
-        estimator.meet(walk, met);
-        if (point.material->unlit) shown = met.radiance;
-    }
-    if (!path.featuresPending && walk.bounces >= in.options.maxBounces) return false;
+    bool emits = false;
+    Rgb shown;
+    if (!meetSurface(path, hit, point, estimator, emits, shown)) return false;
 
     const PathVertex<F> vertex(walk, point);
     const BasicBsdf<F>& bsdf = vertex.side.bsdf;
-    if (path.featuresPending && (bsdf.hasSmoothLobe() || emits)) {
-        path.featuresPending = false;
-        path.seen.normal = point.shadingNormal;
-        path.seen.albedo = emits ? shown : bsdf.albedo();
-    }
+    showFeatures(path, point, bsdf.hasSmoothLobe(), emits, emits ? shown : bsdf.albedo());
     if (walk.bounces >= in.options.maxBounces) return false;
     if (walk.bounces > 0) countEffect(Effect::Indirect);
 
@@ -88,10 +112,36 @@ bool scatterAt(EyePath& path, const Hit& hit, const PathSampler& sampler, Estima
     if (isBlack(next.weight)) return false;
     const Vec3 direction = normalized(vertex.side.frame.toWorld(next.wi));
     estimator.scatter(vertex, next, direction);
-    path.mirrored = path.mirrored && next.delta;
-    walk.throughput *= next.weight;
-    const float survival = std::min(1.f, maxComponent(walk.throughput));
-    return walk.goOn(vertex, next, direction, survival, choice.y);
+    return scattered(path, point, vertex.media, next, direction, choice.y);
+}
+
+/// Follows the path's ray to the next surface; nothing where it ends before, at a light or in the distance.
+template <class Estimator>
+std::optional<Hit> meetNext(EyePath& path, Estimator& estimator) {
+    Walk& walk = path.walk;
+    const PathContext& in = walk.in;
+    const Ray& ray = walk.ray;
+    const std::optional<Hit> hit = in.accelerator.intersect(ray, path.raySeed());
+    if (walk.bounces == 0) {
+        if (in.options.motion != nullptr) path.seen.moved = in.options.motion->of(ray, hit);
+        path.seen.hit = hit.has_value();
+        path.seen.depth = hit ? hit->distance : 0;
+    }
+    if (!hit) {
+        if (in.scene.environment) estimator.meet(walk, environmentMet(in, ray.direction));
+        return {};
+    }
+    if (hit->light < 0) return hit;
+    walk.travel(hit->distance);
+    const Vec3 outwards = ray.origin + ray.direction * hit->distance -
+                          in.scene.lights[static_cast<std::size_t>(hit->light)].position;
+    estimator.meet(walk, sphereMet(in, *hit, ray, outwards));
+    if (path.featuresPending) path.seen.normal = normalized(outwards);
+    return {};
+}
+
+inline EyePath startOf(const PathContext& in, const Ray& ray, const PathSampler& sampler) {
+    return {{in, ray}, in.hashesOpacity ? sampler.hashSeed(dimension::kOpacity) : 0, {}};
 }
 
 /// Follows a camera ray from surface to surface: at each, scatter(EyePath&, const Hit&) is scatterAt with the
@@ -99,30 +149,9 @@ bool scatterAt(EyePath& path, const Hit& hit, const PathSampler& sampler, Estima
 template <class Estimator, class Scatter>
 PathSample eyeSubpath(const PathContext& in, const Ray& start, const PathSampler& sampler,
                       Estimator& estimator, const Scatter& scatter) {
-    EyePath path{{in, start}, in.hashesOpacity ? sampler.hashSeed(dimension::kOpacity) : 0, {}};
-    const Walk& walk = path.walk;
-    for (;;) {
-        const Ray& ray = walk.ray;
-        const std::optional<Hit> hit = in.accelerator.intersect(ray, path.raySeed());
-        if (walk.bounces == 0) {
-            if (in.options.motion != nullptr) path.seen.moved = in.options.motion->of(ray, hit);
-            path.seen.hit = hit.has_value();
-            path.seen.depth = hit ? hit->distance : 0;
-        }
-        if (!hit) {
-            if (in.scene.environment) estimator.meet(walk, environmentMet(in, ray.direction));
-            break;
-        }
-        if (hit->light >= 0) {
-            path.walk.travel(hit->distance);
-            const Vec3 outwards = ray.origin + ray.direction * hit->distance -
-                                  in.scene.lights[static_cast<std::size_t>(hit->light)].position;
-            estimator.meet(walk, sphereMet(in, *hit, ray, outwards));
-            if (path.featuresPending) path.seen.normal = normalized(outwards);
-            break;
-        }
+    EyePath path = startOf(in, start, sampler);
+    while (const std::optional<Hit> hit = meetNext(path, estimator))
         if (!scatter(path, *hit)) break;
-    }
     return path.seen;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "render/math/sampling.h"
@@ -44,6 +45,7 @@ struct Splat {
     float y = 0;
     Rgb radiance;      ///< to be divided by the number of light subpaths for each pixel of the window
     float spread = 0;  ///< radiance^2 x spread: part of the second moment of path tracing (pathSquares)
+    std::uint32_t sample = 0;  ///< whose subpath it is: its place among those traced together
 };
 
 /// Estimates a picture, camera sample by camera sample: the random numbers, the point of the lens and the
@@ -63,10 +65,22 @@ class Integrator {
     PathSample trace(const CameraSample& sample, std::vector<Splat>& splats,
                      Rgb* pathSquares = nullptr) const;
 
+    /// The same for many samples, which takes less time: to `found`, of as many.
+    virtual void trace(std::span<const CameraSample> samples, std::span<PathSample> found,
+                       std::vector<Splat>& splats) const;
+
   protected:
     Integrator(const View& view, const EffectSet& effects);
 
     const View& view() const { return view_; }
+
+    /// A sample's ray, and the point of the lens that it starts at.
+    struct Start {
+        PathSampler sampler;
+        Vec2 lens;
+        Ray ray;
+    };
+    Start startOf(const CameraSample& sample) const;
 
   private:
     /// `ray` starts at `lens`, a point of [0, 1)^2.

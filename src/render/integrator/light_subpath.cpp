@@ -116,7 +116,7 @@ std::vector<BidirectionalTracer::LightVertex> BidirectionalTracer::lightSubpath(
             std::min(1.f, maxComponent(walk.throughput * scattered) / maxComponent(walk.throughput));
         walk.throughput *= scattered;
         if (!(maxComponent(walk.throughput) > 0)) break;
-        if (!walk.goOn(vertex, next, direction, survival, choice.y)) break;
+        if (!walk.goOn(vertex.point, vertex.media, next.through, direction, survival, choice.y)) break;
     }
     return path;
 }

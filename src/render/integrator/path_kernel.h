@@ -1,5 +1,8 @@
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "render/integrator/eye_subpath.h"
 
 /// The path tracer's estimate, and what it does at a surface, compiled for what surfaces call for; see
@@ -16,7 +19,7 @@ inline float powerHeuristic(float own, float other) {
 class PathEstimate {
   public:
     explicit PathEstimate(const PathContext& in)
-        : in_(in),
+        : in_(&in),
           choosesLights_(in.lights.size() > 1 || in.options.effects == EffectSet::all()),
           dropsCaustics_(in.options.leftOut.has(Effect::Caustics)) {}
 
@@ -28,17 +31,48 @@ class PathEstimate {
 
     template <Features F>
     void gather(const Walk& walk, const PathVertex<F>& vertex, const BouncePairs& pairs, std::uint32_t seed) {
-        lightsSampled_ = vertex.side.bsdf.hasSmoothLobe() && !in_.lights.empty() &&
-                         in_.options.strategy != Strategy::BsdfOnly;
-        if (!lightsSampled_) return;
-        const SurfacePoint& point = vertex.point;
-        in_.lights.prepare(local_, {point.position, point.shadingNormal, point.material->transmissive()});
-        const float choice = choosesLights_ ? pairs[dimension::kLightChoice].x : 0;
-        radiance_ += walk.throughput * direct(vertex, choice, pairs[dimension::kLight], walk.ray.time, seed);
+        if (!asksForLight(vertex.side.bsdf.hasSmoothLobe())) return;
+        in_->lights.prepare(local_, receiverAt(vertex.point));
+        const LightSample light = chooseLight(pairs);
+        if (reaches(light))
+            add(walk, vertex.point, vertex.media, light, vertex.side.evaluate(light.direction), seed);
     }
 
     template <Features F>
     void scatter(const PathVertex<F>&, const BsdfSample& next, const Vec3&) {
+        scatter(next);
+    }
+
+    /// Whether a light is chosen at a surface.
+    bool asksForLight(bool smoothLobe) {
+        return lightsSampled_ =
+                   smoothLobe && !in_->lights.empty() && in_->options.strategy != Strategy::BsdfOnly;
+    }
+    static Receiver receiverAt(const SurfacePoint& point) {
+        return {point.position, point.shadingNormal, point.material->transmissive()};
+    }
+    LightSampler::Local& local() { return local_; }
+    /// By what local() was prepared for.
+    LightSample chooseLight(const BouncePairs& pairs) const {
+        return in_->lights.sample(local_, choosesLights_ ? pairs[dimension::kLightChoice].x : 0,
+                                  pairs[dimension::kLight]);
+    }
+
+    static bool reaches(const LightSample& light) { return light.pdf > 0 && !isBlack(light.radiance); }
+
+    /// What comes of a light that reaches(), if nothing is in its way; `f`: in its direction.
+    void add(const Walk& walk, const SurfacePoint& point, const Media& media, const LightSample& light,
+             const BsdfValue& f, std::uint32_t seed) {
+        if (isBlack(f.value)) return;
+        if (in_->accelerator.occluded(leave(point, light.direction, walk.ray.time), light.distance, seed))
+            return;
+        const bool alone = light.delta || in_->options.strategy == Strategy::LightsOnly;
+        const float weight = alone ? 1 : powerHeuristic(light.pdf, f.pdf);
+        const Rgb arriving = light.radiance * media.arriving(point, light.direction, light.distance);
+        radiance_ += walk.throughput * (f.value * arriving * (weight / light.pdf));
+    }
+
+    void scatter(const BsdfSample& next) {
         bsdfPdf_ = next.pdf;
         lightsSampled_ = lightsSampled_ && !next.delta;
         scattered_ = scattered_ || !next.delta;
@@ -49,30 +83,15 @@ class PathEstimate {
     /// Weight of light that the BSDF's sampling found.
     float chanceWeight(const MetLight& met, const Vec3& direction) const {
         if (caustic_) return 0;
-        if (!lightsSampled_ || in_.options.strategy == Strategy::BsdfOnly) return 1;
-        if (in_.options.strategy == Strategy::LightsOnly) return 0;
+        if (!lightsSampled_ || in_->options.strategy == Strategy::BsdfOnly) return 1;
+        if (in_->options.strategy == Strategy::LightsOnly) return 0;
         if (met.light < 0) return 1;
-        const double pdf = in_.lights.density(local_, static_cast<std::uint32_t>(met.light), met.triangle,
-                                              direction, met.distance, met.cosLight);
+        const double pdf = in_->lights.density(local_, static_cast<std::uint32_t>(met.light), met.triangle,
+                                               direction, met.distance, met.cosLight);
         return powerHeuristic(bsdfPdf_, static_cast<float>(pdf));
     }
 
-    /// One light's contribution at a vertex.
-    template <Features F>
-    Rgb direct(const PathVertex<F>& vertex, float choice, Vec2 u, float time, std::uint32_t seed) const {
-        const LightSample light = in_.lights.sample(local_, choice, u);
-        if (!(light.pdf > 0) || isBlack(light.radiance)) return {};
-        const BsdfValue f = vertex.side.evaluate(light.direction);
-        if (isBlack(f.value)) return {};
-        if (in_.accelerator.occluded(leave(vertex.point, light.direction, time), light.distance, seed))
-            return {};
-        const bool alone = light.delta || in_.options.strategy == Strategy::LightsOnly;
-        const float weight = alone ? 1 : powerHeuristic(light.pdf, f.pdf);
-        return f.value * (light.radiance * vertex.arriving(light.direction, light.distance)) *
-               (weight / light.pdf);
-    }
-
-    const PathContext& in_;
+    const PathContext* in_;
     bool choosesLights_;
     bool dropsCaustics_;
     Rgb radiance_;
@@ -83,15 +102,33 @@ class PathEstimate {
     bool caustic_ = false;        // then by smooth ones only
 };
 
-using PathStep = bool(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+/// A camera ray's path in a stream of them.
+struct StreamedPath {
+    StreamedPath(const PathContext& in, const Ray& ray, const PathSampler& numbers)
+        : sampler(numbers), path(startOf(in, ray, sampler)), estimate(in) {}
+
+    PathSampler sampler;
+    EyePath path;
+    PathEstimate estimate;
+    Hit hit;  ///< where it is
+};
+
+/// What scatterAt does, for paths that have all met surfaces which call for `F` at most. Those that go on are
+/// appended to `alive`, in their order.
+template <Features F>
+void scatterAll(std::span<StreamedPath* const> met, std::vector<StreamedPath*>& alive);
 
 // Compiled in kernels_*.cpp.
-extern template bool scatterAt<kMatte>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
-extern template bool scatterAt<kMatteTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
-extern template bool scatterAt<kReflecting>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
-extern template bool scatterAt<kReflectingTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
-extern template bool scatterAt<kLayered>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
-extern template bool scatterAt<kLayeredTextured>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
-extern template bool scatterAt<kEveryFeature>(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+#define VLX_KERNEL(F)                                                                           \
+    extern template bool scatterAt<F>(EyePath&, const Hit&, const PathSampler&, PathEstimate&); \
+    extern template void scatterAll<F>(std::span<StreamedPath* const>, std::vector<StreamedPath*>&);
+VLX_KERNEL(kMatte)
+VLX_KERNEL(kMatteTextured)
+VLX_KERNEL(kReflecting)
+VLX_KERNEL(kReflectingTextured)
+VLX_KERNEL(kLayered)
+VLX_KERNEL(kLayeredTextured)
+VLX_KERNEL(kEveryFeature)
+#undef VLX_KERNEL
 
 }  // namespace vlx::render

@@ -11,11 +11,12 @@ namespace {
 struct Kernel {
     Features features;
     bool (*scatterAt)(EyePath&, const Hit&, const PathSampler&, PathEstimate&);
+    void (*scatterAll)(std::span<StreamedPath* const>, std::vector<StreamedPath*>&);
 };
 
 /// Smallest first.
 constexpr std::array kKernels = [] {
-    const auto of = []<Features F>() { return Kernel{F, &scatterAt<F, PathEstimate>}; };
+    const auto of = []<Features F>() { return Kernel{F, &scatterAt<F, PathEstimate>, &scatterAll<F>}; };
     return std::array{of.operator()<kMatte>(),       of.operator()<kMatteTextured>(),
                       of.operator()<kReflecting>(),  of.operator()<kReflectingTextured>(),
                       of.operator()<kLayered>(),     of.operator()<kLayeredTextured>(),
@@ -67,6 +68,36 @@ PathSample PathTracer::along(const Ray& ray, const PathSampler& sampler) const {
     });
     sample.radiance = estimate.radiance();
     return sample;
+}
+
+void PathTracer::trace(std::span<const CameraSample> samples, std::span<PathSample> found,
+                       std::vector<Splat>&) const {
+    std::vector<StreamedPath> paths;
+    paths.reserve(samples.size());
+    std::vector<StreamedPath*> alive;
+    for (const CameraSample& sample : samples) {
+        const Start start = startOf(sample);
+        alive.push_back(&paths.emplace_back(context_, start.ray, start.sampler));
+    }
+    std::array<std::vector<StreamedPath*>, kKernels.size()> met;
+    while (!alive.empty()) {
+        for (StreamedPath* p : alive)
+            if (const std::optional<Hit> hit = meetNext(p->path, p->estimate)) {
+                p->hit = *hit;
+                const Shape& shape = context_.scene.shapes[hit->shape];
+                __builtin_prefetch(&context_.scene.triangles[shape.firstTriangle + hit->triangle]);
+                met[kernels_[hit->shape]].push_back(p);
+            }
+        alive.clear();
+        for (std::size_t k = 0; k < kKernels.size(); ++k) {
+            kKernels[k].scatterAll(met[k], alive);
+            met[k].clear();
+        }
+    }
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        found[i] = paths[i].path.seen;
+        found[i].radiance = paths[i].estimate.radiance();
+    }
 }
 
 const Features& PathTracer::featuresAt(std::size_t shape) const { return kKernels[kernels_[shape]].features; }

@@ -17,6 +17,11 @@ class PathTracer final : public Integrator {
     PathTracer(const Scene& scene, const Accelerator& accelerator, const View& view,
                const PathOptions& options);
 
+    using Integrator::trace;
+    /// Paths go on together, and at each surface those that call for the same kernel.
+    void trace(std::span<const CameraSample> samples, std::span<PathSample> found,
+               std::vector<Splat>& splats) const override;
+
     /// What comes in along any ray.
     PathSample along(const Ray& ray, const PathSampler& sampler) const;
 

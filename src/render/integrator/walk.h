@@ -25,20 +25,40 @@ inline Rgb transmitted(const Rgb& absorption, float distance) {
     return {kept(absorption.x), kept(absorption.y), kept(absorption.z)};
 }
 
-/// A surface as seen from one direction.
-template <Features F>
+/// A surface as seen from one direction; of Lanes, four of them.
+template <Features F, class Real = float>
 struct Side {
-    Side(const Scene& scene, const SurfacePoint& seen, const SurfaceParameters& surface, const Vec3& viewer)
-        : frame(seen.shadingNormal),
+    using Vector = Vec3Of<Real>;
+
+    Side(const AlbedoTable& coatTable, const Vector& shadingNormal, const Vector& geometricNormal,
+         Mask<Real> fromBehind, const SurfaceParametersOf<Real>& surface, const Vector& viewer)
+        : frame(shadingNormal),
           wo(frame.toLocal(viewer)),
-          bsdf(surface, {wo.x, wo.y, std::max(wo.z, 1e-4f)}, seen.fromBehind, scene.albedoTables[0],
-               frame.toLocal(seen.geometricNormal)) {}
+          bsdf(surface, {wo.x, wo.y, larger(wo.z, spread<Real>(1e-4f))}, fromBehind, coatTable,
+               frame.toLocal(geometricNormal)) {}
+    Side(const Scene& scene, const SurfacePoint& seen, const SurfaceParameters& surface, const Vec3& viewer)
+        : Side(scene.albedoTables[0], seen.shadingNormal, seen.geometricNormal, seen.fromBehind, surface,
+               viewer) {}
 
-    BsdfValue evaluate(const Vec3& direction) const { return bsdf.evaluate(frame.toLocal(direction)); }
+    BsdfValueOf<Real> evaluate(const Vector& direction) const {
+        return bsdf.evaluate(frame.toLocal(direction));
+    }
 
-    Frame frame;
-    Vec3 wo;
-    BasicBsdf<F> bsdf;
+    FrameOf<Real> frame;
+    Vector wo;
+    BasicBsdf<F, Real> bsdf;
+};
+
+/// What absorbs about a surface, where something does.
+struct Media {
+    const Material* here = nullptr;    ///< on the side that a subpath comes from,
+    const Material* beyond = nullptr;  ///< and on the other
+
+    /// Part that arrives at a point of light that starts at a distance in `direction`.
+    Rgb arriving(const SurfacePoint& point, const Vec3& direction, float distance) const {
+        const Material* through = dot(point.geometricNormal, direction) < 0 ? beyond : here;
+        return through != nullptr ? transmitted(through->absorption, distance) : Rgb(1);
+    }
 };
 
 struct Walk;
@@ -50,20 +70,17 @@ struct PathVertex {
 
     Point point;  ///< as seen from the vertex before
     SurfaceParameters surface;
-    Vec3 back;                         ///< unit, to the vertex before
-    const Material* medium = nullptr;  ///< that absorbs on the side of `back`,
-    const Material* beyond = nullptr;  ///< and on the other
-    Side<F> side;                      ///< that is seen from the vertex before
+    Vec3 back;  ///< unit, to the vertex before
+    Media media;
+    Side<F> side;  ///< that is seen from the vertex before
 
     float cosine(const Vec3& direction) const { return std::abs(dot(point.geometricNormal, direction)); }
     /// As seen from elsewhere.
     Side<F> from(const Scene& scene, const Vec3& viewer) const {
         return {scene, seenFrom(point, viewer), surface, viewer};
     }
-    /// Part that arrives of light that starts at a distance in `direction`.
     Rgb arriving(const Vec3& direction, float distance) const {
-        const Material* through = dot(point.geometricNormal, direction) < 0 ? beyond : medium;
-        return through != nullptr ? transmitted(through->absorption, distance) : Rgb(1);
+        return media.arriving(point, direction, distance);
     }
 };
 
@@ -102,17 +119,21 @@ struct Walk {
     /// Goes on behind the surface as if it were not there.
     void pass(const SurfacePoint& point) { ray = leave(point, ray.direction, ray.time); }
 
-    /// Goes on from a vertex, which has scattered; roulette lets the path live with probability `survival`,
-    /// decided by `u`. Returns whether it lives.
-    template <Features F, class Point>
-    bool goOn(const PathVertex<F, Point>& vertex, const BsdfSample& scattered, const Vec3& direction,
+    /// About a surface that the ray has met.
+    Media mediaAt(const SurfacePoint& point) const {
+        return {medium, !point.fromBehind && absorbs(*point.material) ? point.material : nullptr};
+    }
+
+    /// Goes on from a point of a surface, which has scattered, `through` it or not; roulette lets the path
+    /// live with probability `survival`, decided by `u`. Returns whether it lives.
+    bool goOn(const SurfacePoint& point, const Media& media, bool through, const Vec3& direction,
               float survival, float u) {
         if (bounces >= kSureBounces) {
             if (u >= survival) return false;
             throughput *= 1 / survival;
         }
-        if (scattered.through) medium = vertex.beyond;
-        ray = leave(vertex.point, direction, ray.time);
+        if (through) medium = media.beyond;
+        ray = leave(point, direction, ray.time);
         ++bounces;
         way = 0;
         return true;
@@ -124,8 +145,7 @@ PathVertex<F, Point>::PathVertex(const Walk& walk, const SurfacePoint& met)
     : point(met),
       surface(walk.parameters<F>(point)),
       back(-walk.ray.direction),
-      medium(walk.medium),
-      beyond(!point.fromBehind && walk.absorbs(*point.material) ? point.material : nullptr),
+      media(walk.mediaAt(point)),
       side(walk.in.scene, point, surface, back) {}
 
 }  // namespace vlx::render

@@ -17,7 +17,10 @@ enum class LightUnits : std::uint8_t { Auto, Radiometric, Photometric };
 
 /// A spot fades from the edge of its cone, t = 0, to where it is full, t = 1, by t^2 times this: 1, as
 /// KHR_lights_punctual recommends, or, with `step` 1, what makes it the smooth step 3 t^2 - 2 t^3.
-inline float coneEase(float t, float step) { return 1 + 2 * step * (1 - t); }
+template <class Real>
+Real coneEase(Real t, float step) {
+    return 1.f + 2 * step * (1.f - t);
+}
 
 /// A light as next-event estimation sees it. Radiometric units.
 struct Light {

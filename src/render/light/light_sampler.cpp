@@ -12,12 +12,7 @@ LightSampler::LightSampler(const Scene& scene, bool measures)
         if (light.type == LightType::Environment)
             environmentLight_ = static_cast<std::int32_t>(candidates_.size()) - 1;
     }
-    if (candidates_.size() > kLocalLights) {
-        tree_ = LightTree(candidates_);
-        return;
-    }
-    quads_.resize((candidates_.size() + 3) / 4);
-    for (std::size_t i = 0; i < candidates_.size(); ++i) quads_[i / 4].set(i % 4, candidates_[i]);
+    if (candidates_.size() > kLocalLights) tree_ = LightTree(candidates_);
 }
 
 void LightSampler::addTriangles(const Light& light) {
@@ -37,23 +32,23 @@ void LightSampler::addTriangles(const Light& light) {
     }
 }
 
-void LightSampler::estimate(Local& local) const {
-    const Receiver& receiver = local.receiver;
-    if (candidates_.size() > kLocalLights) return;
-    for (std::size_t i = 0; i < quads_.size(); ++i) {
-        const LightQuad::Floats w = quads_[i].importance(receiver);
-        for (std::size_t lane = 0; lane < 4; ++lane) local.weights[4 * i + lane] = w[lane];
-    }
-    // In the order of the lights, so that lights that reach nothing change no bit.
-    float sum = 0;
-    std::uint32_t possible = 0;
+template <class Real, std::size_t n>
+void LightSampler::estimate(const std::array<Local*, n>& locals, const ReceiverOf<Real>& receivers) const {
+    Real sum{}, possible{};
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
-        sum += local.weights[i];
-        possible += local.weights[i] > 0;
+        const Real weight = lightImportance(receivers, candidates_[i]);
+        sum += weight;
+        possible += weight > 0 ? spread<Real>(1) : Real{};
+        for (std::size_t k = 0; k < n; ++k) locals[k]->weights[i] = laneOf(weight, k);
     }
-    local.sum = sum;
-    local.possible = possible;
+    for (std::size_t k = 0; k < n; ++k) {
+        locals[k]->sum = laneOf(sum, k);
+        locals[k]->possible = laneOf(possible, k);
+    }
 }
+
+template void LightSampler::estimate(const std::array<Local*, 1>&, const Receiver&) const;
+template void LightSampler::estimate(const std::array<Local*, kLanes>&, const ReceiverOf<Lanes>&) const;
 
 LightSampler::Choice LightSampler::choose(const Local& local, float u) const {
     if (candidates_.size() > kLocalLights) {
@@ -61,7 +56,7 @@ LightSampler::Choice LightSampler::choose(const Local& local, float u) const {
         return {c.light, c.probability};
     }
     if (local.possible == 0) return {};
-    const float even = kEvenPart / static_cast<float>(local.possible);
+    const float even = kEvenPart / local.possible;
     float rest = u;
     Choice last;
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
@@ -77,7 +72,7 @@ float LightSampler::probability(const Local& local, std::size_t light) const {
     if (candidates_.size() > kLocalLights) return tree_.probability(candidates_, local.receiver, light);
     const float own = local.weights[light];
     if (own == 0) return 0;
-    return kEvenPart / static_cast<float>(local.possible) + (1 - kEvenPart) * (own / local.sum);
+    return kEvenPart / local.possible + (1 - kEvenPart) * (own / local.sum);
 }
 
 LightSample LightSampler::sampleSphere(const Receiver& receiver, const Light& light, Vec2 u) const {

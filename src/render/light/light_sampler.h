@@ -42,9 +42,9 @@ class LightSampler {
     /// Estimates at one receiver, made once for its light sample and for what the path then meets by chance.
     struct Local {
         Receiver receiver;
-        alignas(16) std::array<float, kLocalLights> weights;
-        float sum = 0;
-        std::uint32_t possible = 0;
+        std::array<float, kLocalLights> weights{1};  ///< of a single light, taken without estimates
+        float sum = 1;
+        float possible = 1;  ///< how many are not 0
     };
 
     bool empty() const { return candidates_.empty(); }
@@ -52,12 +52,14 @@ class LightSampler {
 
     void prepare(Local& local, const Receiver& receiver) const {
         local.receiver = receiver;
-        if (!alone_) {
-            estimate(local);
-            return;
-        }
-        local.weights[0] = local.sum = 1;
-        local.possible = 1;
+        if (estimates()) estimate<float>(std::array{&local}, receiver);
+    }
+    /// Four receivers at once: the same estimates.
+    void prepare(const std::array<Local*, kLanes>& locals, const ReceiverOf<Lanes>& receivers) const {
+        for (std::size_t i = 0; i < kLanes; ++i)
+            locals[i]->receiver = {lane(receivers.position, i), lane(receivers.normal, i),
+                                   receivers.bothSides[i] != 0};
+        if (estimates()) estimate<Lanes>(locals, receivers);
     }
     LightSample sample(const Local& local, float choice, Vec2 u) const {
         // The commonest of the simple cases.
@@ -91,7 +93,9 @@ class LightSampler {
         std::size_t light = 0;
         float probability = 0;
     };
-    void estimate(Local& local) const;
+    bool estimates() const { return !alone_ && candidates_.size() <= kLocalLights; }
+    template <class Real, std::size_t n>
+    void estimate(const std::array<Local*, n>& locals, const ReceiverOf<Real>& receivers) const;
     void addTriangles(const Light& light);
     Choice choose(const Local& local, float u) const;
     /// Probability with which sample() would have chosen a light.
@@ -109,7 +113,6 @@ class LightSampler {
     std::vector<LightCandidate> candidates_;
     std::vector<EmitterTriangle> triangles_;
     std::vector<MeshLight> meshes_;  ///< one for each light
-    std::vector<LightQuad> quads_;   ///< when there are at most kLocalLights
     LightTree tree_;                 ///< when there are more than kLocalLights
     std::int32_t environmentLight_ = -1;
     bool measures_;

@@ -17,51 +17,6 @@ float at(const Vec3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v
 
 }  // namespace
 
-void LightQuad::set(std::size_t lane, const LightCandidate& light) {
-    constexpr float kHuge = 1e18f;
-    const bool mesh = light.type == LightType::Mesh, far = light.type == LightType::Environment;
-    x[lane] = light.position.x;
-    y[lane] = light.position.y;
-    z[lane] = light.position.z;
-    dx[lane] = light.direction.x;
-    dy[lane] = light.direction.y;
-    dz[lane] = light.direction.z;
-    strength[lane] = light.strength;
-    coneScale[lane] = light.coneScale;
-    coneOffset[lane] = light.coneOffset;
-    coneStep[lane] = light.coneStep;
-    area[lane] = far ? kHuge * kHuge : mesh ? light.area : 1;
-    nearest[lane] = mesh ? 0.25f * square(light.radius) : square(light.radius);
-    most[lane] = mesh || far ? kPi : kHuge * kHuge;
-    depth[lane] = far ? kHuge : light.radius * 1.001f;
-    isPoint[lane] = light.type == LightType::Point || light.type == LightType::Spot ? -1 : 0;
-    isDirectional[lane] = light.type == LightType::Directional ? -1 : 0;
-}
-
-LightQuad::Floats LightQuad::importance(const Receiver& receiver) const {
-    const auto greater = [](Floats a, Floats b) { return a > b ? a : b; };
-    const auto lesser = [](Floats a, Floats b) { return a < b ? a : b; };
-    const Floats none{}, one = none + 1;
-    const Floats tx = x - receiver.position.x, ty = y - receiver.position.y, tz = z - receiver.position.z;
-    const Floats d2 = tx * tx + ty * ty + tz * tz;
-    const Floats height = tx * receiver.normal.x + ty * receiver.normal.y + tz * receiver.normal.z;
-    // Area lights.
-    const Floats spread = lesser(area / greater(d2, nearest), most);
-    const Floats above = receiver.bothSides ? one : (height > -depth ? one : none);
-    // Points and directions.
-    Floats distance;
-    for (std::size_t i = 0; i < 4; ++i) distance[i] = std::sqrt(d2[i]);
-    const Floats inverse = d2 > none ? one / distance : none;
-    const Floats along = (tx * dx + ty * dy + tz * dz) * inverse;
-    const Floats cone = greater(lesser(coneOffset - along * coneScale, one), none);
-    const Floats facing = -(dx * receiver.normal.x + dy * receiver.normal.y + dz * receiver.normal.z);
-    const Floats cosine = receiver.bothSides ? one : greater(isDirectional ? facing : height * inverse, none);
-    const Floats narrow =
-        isDirectional ? cosine
-                      : cone * cone * (one + 2 * coneStep * (one - cone)) * cosine * inverse * inverse;
-    return strength * ((isPoint | isDirectional) ? narrow : above * spread);
-}
-
 LightTree::LightTree(std::span<const LightCandidate> lights) : leafOf_(lights.size()) {
     std::vector<std::uint32_t> order(lights.size());
     std::iota(order.begin(), order.end(), 0u);

@@ -9,12 +9,15 @@
 
 namespace vlx::render {
 
-/// The point that is lit: its shading normal lets lights behind an opaque surface be left out.
-struct Receiver {
-    Vec3 position;
-    Vec3 normal;
-    bool bothSides = false;  ///< light from behind counts (glass)
+/// The point that is lit: its shading normal lets lights behind an opaque surface be left out. Of Lanes, four
+/// points.
+template <class Real>
+struct ReceiverOf {
+    Vec3Of<Real> position;
+    Vec3Of<Real> normal;
+    Mask<Real> bothSides{};  ///< light from behind counts (glass)
 };
+using Receiver = ReceiverOf<float>;
 
 /// What choosing among the lights takes, close together in memory.
 struct LightCandidate {
@@ -36,60 +39,47 @@ struct LightCandidate {
 inline constexpr float kEvenPart = 0.1f;
 
 /// Whether a ball about a centre lies below the receiver's horizon.
-inline bool belowHorizon(const Receiver& receiver, const Vec3& toCentre, float radius) {
+template <class Real>
+Mask<Real> belowHorizon(const ReceiverOf<Real>& receiver, const Vec3Of<Real>& toCentre, float radius) {
     return !receiver.bothSides && dot(toCentre, receiver.normal) <= -radius * 1.001f;
 }
 
 /// Estimated irradiance, unoccluded: 0 only where the light cannot contribute.
-inline float lightImportance(const Receiver& receiver, const LightCandidate& light) {
-    const float strength = light.strength;
-    const auto cosineAt = [&](const Vec3& direction) {
-        return receiver.bothSides ? 1.f : std::max(0.f, dot(receiver.normal, direction));
+template <class Real>
+Real lightImportance(const ReceiverOf<Real>& receiver, const LightCandidate& light) {
+    using Vector = Vec3Of<Real>;
+    const Real one = spread<Real>(1);
+    const auto cosineAt = [&](const Vector& direction) {
+        return receiver.bothSides ? one : larger(Real{}, dot(receiver.normal, direction));
     };
-    const Vec3 to = light.position - receiver.position;
-    const float d2 = lengthSquared(to);
+    const Vector to = everywhere<Real>(light.position) - receiver.position;
+    const Real d2 = lengthSquared(to);
     switch (light.type) {
         case LightType::Point:
         case LightType::Spot: {
-            if (d2 == 0) return 0;
-            const Vec3 direction = to / std::sqrt(d2);
-            const float cone =
-                std::clamp(light.coneOffset - dot(direction, light.direction) * light.coneScale, 0.f, 1.f);
-            return strength * cone * cone * coneEase(cone, light.coneStep) * cosineAt(direction) / d2;
+            const Vector direction = to / squareRoot(d2);
+            const Real along = dot(direction, everywhere<Real>(light.direction));
+            const Real cone = clamped(light.coneOffset - along * light.coneScale, Real{}, one);
+            const Real v =
+                light.strength * cone * cone * coneEase(cone, light.coneStep) * cosineAt(direction) / d2;
+            return d2 == 0 ? Real{} : v;
         }
         case LightType::Directional:
-            return strength * cosineAt(-light.direction);
-        case LightType::Sphere:
-            return belowHorizon(receiver, to, light.radius) ? 0
-                                                            : strength / std::max(d2, square(light.radius));
-        case LightType::Mesh:
-            return belowHorizon(receiver, to, light.radius)
-                       ? 0
-                       : strength * std::min(light.area / std::max(d2, 0.25f * square(light.radius)), kPi);
+            return light.strength * cosineAt(everywhere<Real>(-light.direction));
+        case LightType::Sphere: {
+            const Real v = light.strength / larger(d2, spread<Real>(square(light.radius)));
+            return belowHorizon(receiver, to, light.radius) ? Real{} : v;
+        }
+        case LightType::Mesh: {
+            const Real nearest = larger(d2, spread<Real>(0.25f * square(light.radius)));
+            const Real v = light.strength * smaller(light.area / nearest, spread<Real>(kPi));
+            return belowHorizon(receiver, to, light.radius) ? Real{} : v;
+        }
         case LightType::Environment:
-            return strength * kPi;
+            return spread<Real>(light.strength * kPi);
     }
-    return 0;
+    return Real{};
 }
-
-/// Four lights side by side, for lightImportance of all of them at once. Spheres and environments are mesh
-/// lights of other bounds.
-struct LightQuad {
-    using Floats [[gnu::vector_size(16)]] = float;
-    using Mask [[gnu::vector_size(16)]] = std::int32_t;
-
-    Floats x{}, y{}, z{};     ///< position
-    Floats dx{}, dy{}, dz{};  ///< direction
-    Floats strength{};        ///< 0: no light
-    Floats coneScale{}, coneOffset{}, coneStep{};
-    Floats area{}, nearest{}, most{};  ///< of min(area / max(distance^2, nearest), most)
-    Floats depth{};                    ///< of the bounds below the horizon
-    Mask isPoint{}, isDirectional{};
-
-    void set(std::size_t lane, const LightCandidate& light);
-    /// lightImportance of each, but for rounding.
-    Floats importance(const Receiver& receiver) const;
-};
 
 /// A binary tree over many lights, each node with the bounds and the summed intensity of its lights:
 /// descended by estimated irradiance, so that near lights and strong ones are chosen often and no list is

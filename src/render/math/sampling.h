@@ -128,23 +128,26 @@ class PathSampler {
 };
 
 /// Uniform square to uniform unit disk, concentric (Shirley, Chiu, 1997).
-inline Vec2 toDisk(Vec2 u) {
-    const float a = 2 * u.x - 1, b = 2 * u.y - 1;
-    if (a == 0 && b == 0) return {0, 0};
-    const bool wide = std::abs(a) > std::abs(b);
-    const float r = wide ? a : b;
+template <class Real>
+Vec2Of<Real> toDisk(const Vec2Of<Real>& u) {
+    const Real a = 2.f * u.x - 1.f, b = 2.f * u.y - 1.f;
+    const Mask<Real> wide = magnitude(a) > magnitude(b);
+    const Real r = wide ? a : b;
     // Sine and cosine of an angle of at most pi / 4, from the nearer axis: Taylor's series is exact in float.
-    const float x = (kPi / 4) * (wide ? b / a : a / b), x2 = x * x;
-    const float sine =
-        x * (1 + x2 * (-1.f / 6 + x2 * (1.f / 120 + x2 * (-1.f / 5040 + x2 * (1.f / 362880)))));
-    const float cosine = 1 + x2 * (-0.5f + x2 * (1.f / 24 + x2 * (-1.f / 720 + x2 * (1.f / 40320))));
-    return wide ? Vec2{r * cosine, r * sine} : Vec2{r * sine, r * cosine};
+    const Real x = (kPi / 4) * ((wide ? b : a) / r), x2 = x * x;
+    const Real sine =
+        x * (1.f + x2 * (-1.f / 6 + x2 * (1.f / 120 + x2 * (-1.f / 5040 + x2 * (1.f / 362880)))));
+    const Real cosine = 1.f + x2 * (-0.5f + x2 * (1.f / 24 + x2 * (-1.f / 720 + x2 * (1.f / 40320))));
+    const Mask<Real> centre = r == 0;
+    const Real along = centre ? Real{} : r * cosine, across = centre ? Real{} : r * sine;
+    return {wide ? along : across, wide ? across : along};
 }
 
 /// Cosine-weighted direction about +z; density cos / pi.
-inline Vec3 cosineHemisphere(Vec2 u) {
-    const Vec2 d = toDisk(u);
-    return {d.x, d.y, std::sqrt(std::max(0.f, 1 - d.x * d.x - d.y * d.y))};
+template <class Real>
+Vec3Of<Real> cosineHemisphere(const Vec2Of<Real>& u) {
+    const Vec2Of<Real> d = toDisk(u);
+    return {d.x, d.y, squareRoot(larger(Real{}, 1.f - d.x * d.x - d.y * d.y))};
 }
 
 /// Uniform direction in the cone of directions with z >= cosMax; density 1 / (2 pi (1 - cosMax)).

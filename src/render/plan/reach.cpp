@@ -15,7 +15,8 @@ std::array<Vec3, 8> corners(const Bounds& b) {
 /// Distance of a point to a box.
 float distanceTo(const Bounds& b, const Vec3& p) {
     const auto gap = [](float low, float high, float v) { return std::max({low - v, v - high, 0.f}); };
-    return length({gap(b.low.x, b.high.x, p.x), gap(b.low.y, b.high.y, p.y), gap(b.low.z, b.high.z, p.z)});
+    return length(
+        Vec3{gap(b.low.x, b.high.x, p.x), gap(b.low.y, b.high.y, p.y), gap(b.low.z, b.high.z, p.z)});
 }
 
 /// Whether a plane through the tip of a light's cone has the cone on one side and a box on the other.

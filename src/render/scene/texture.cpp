@@ -31,8 +31,7 @@ int wrapped(int i, int size, Wrap mode) {
     return up < size ? up : up - size < size ? up - size : up - 2 * size;
 }
 
-Rgba operator+(const Rgba& p, const Rgba& q) { return {p.rgb + q.rgb, p.a + q.a}; }
-Rgba operator*(const Rgba& p, float s) { return {p.rgb * s, p.a * s}; }
+Rgba colourOf(Lanes v) { return {{v[0], v[1], v[2]}, v[3]}; }
 
 }  // namespace
 
@@ -53,12 +52,12 @@ Texture::Texture(int width, int height, std::vector<float> rgba, ColourSpace spa
         if (i % 4 != 3) floats_[i] = srgbToLinear(floats_[i]);
 }
 
-Rgba Texture::texel(int x, int y) const {
+inline Lanes Texture::texel(int x, int y) const {
     const std::size_t i =
         4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x));
-    if (!floats_.empty()) return {{floats_[i], floats_[i + 1], floats_[i + 2]}, floats_[i + 3]};
+    if (!floats_.empty()) return Lanes{floats_[i], floats_[i + 1], floats_[i + 2], floats_[i + 3]};
     const ByteTable& table = space_ == ColourSpace::Srgb ? kSrgbBytes : kLinearBytes;
-    return {{table[bytes_[i]], table[bytes_[i + 1]], table[bytes_[i + 2]]}, kLinearBytes[bytes_[i + 3]]};
+    return Lanes{table[bytes_[i]], table[bytes_[i + 1]], table[bytes_[i + 2]], kLinearBytes[bytes_[i + 3]]};
 }
 
 std::pair<Rgba, Rgba> Texture::range() const {
@@ -96,15 +95,15 @@ Rgba Texture::lookup(Vec2 uv) const {
     const float x = wrapU == Wrap::Clamp ? clampedScale(uv.x, width_) : scaled(uv.x, width_);
     const float y = wrapV == Wrap::Clamp ? clampedScale(uv.y, height_) : scaled(uv.y, height_);
     if (nearest)
-        return texel(wrapped(static_cast<int>(std::floor(x)), width_, wrapU),
-                     wrapped(static_cast<int>(std::floor(y)), height_, wrapV));
+        return colourOf(texel(wrapped(static_cast<int>(std::floor(x)), width_, wrapU),
+                              wrapped(static_cast<int>(std::floor(y)), height_, wrapV)));
     const float fx = std::floor(x - 0.5f), fy = std::floor(y - 0.5f);
     const float tx = x - 0.5f - fx, ty = y - 0.5f - fy;
     const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
     const int x0 = wrapped(ix, width_, wrapU), x1 = wrapped(ix + 1, width_, wrapU);
     const int y0 = wrapped(iy, height_, wrapV), y1 = wrapped(iy + 1, height_, wrapV);
-    return (texel(x0, y0) * (1 - tx) + texel(x1, y0) * tx) * (1 - ty) +
-           (texel(x0, y1) * (1 - tx) + texel(x1, y1) * tx) * ty;
+    return colourOf((texel(x0, y0) * (1 - tx) + texel(x1, y0) * tx) * (1 - ty) +
+                    (texel(x0, y1) * (1 - tx) + texel(x1, y1) * tx) * ty);
 }
 
 }  // namespace vlx::render

@@ -39,7 +39,7 @@ class Texture {
     int height() const { return height_; }
 
   private:
-    Rgba texel(int x, int y) const;
+    Lanes texel(int x, int y) const;  ///< r, g, b, a
 
     int width_;
     int height_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 
 #include "render/math/sampling.h"
 #include "render/math/vec.h"
@@ -12,65 +13,74 @@
 /// The surface model. Its parts are templates, defined in bsdf_energy.h and bsdf.h: include the latter.
 namespace vlx::render {
 
-struct DielectricLayer;
+template <class Real>
+struct DielectricLayerOf;
+using DielectricLayer = DielectricLayerOf<float>;
 
 /// A material's parameters at one point, textures applied. Ranges: colours, metallic, roughness,
 /// transmission, specular, clearcoat and clearcoatRoughness in [0, 1]; ior >= 1.
-struct SurfaceParameters {
-    Rgb baseColour{1, 1, 1};
-    float metallic = 0;
-    float roughness = 1;
-    bool retro = false;  ///< diffuse light as in Disney's model
-    float transmission = 0;
-    float ior = 1.5f;
+template <class Real>
+struct SurfaceParametersOf {
+    RgbOf<Real> baseColour{spread<Real>(1)};
+    Real metallic{};
+    Real roughness = spread<Real>(1);
+    Mask<Real> retro{};  ///< diffuse light as in Disney's model
+    Real transmission{};
+    Real ior = spread<Real>(1.5f);
     float specular = 1;
     Rgb specularColour{1, 1, 1};
-    float clearcoat = 0;
-    float clearcoatRoughness = 0;
-    Rgb sheenColour{0, 0, 0};
-    float sheenRoughness = 0;
+    Real clearcoat{};
+    Real clearcoatRoughness{};
+    RgbOf<Real> sheenColour{};
+    Real sheenRoughness{};
     EffectSet leftOut;  ///< of diffuse, glossy, mirror, transmission, rough transmission
     const AlbedoTable* albedoTable = nullptr;  ///< of this ior; required
     const SheenTable* sheenTable = nullptr;    ///< required where there is sheen
     const GlassTable* glassTable = nullptr;    ///< of this ior; without it rough glass loses a little energy
-    const DielectricLayer* layer = nullptr;    ///< of these; null: not known beforehand
+    const DielectricLayerOf<Real>* layer = nullptr;  ///< of these; null: not known beforehand
 };
+using SurfaceParameters = SurfaceParametersOf<float>;
 
 /// A surface's dielectric reflection, as far as neither directions nor the base colour matter.
-struct DielectricLayer {
-    DielectricLayer() = default;
-    explicit DielectricLayer(const SurfaceParameters& surface);
+template <class Real>
+struct DielectricLayerOf {
+    DielectricLayerOf() = default;
+    explicit DielectricLayerOf(const SurfaceParameters& surface) requires std::same_as<Real, float>;
 
     /// Albedo, multiple scattering included.
-    Rgb albedo(const Albedo& a) const {
-        return f0 * (a.whole - a.dielectric) + Rgb(f90 * a.dielectric) + multiple * (1 - a.whole);
+    RgbOf<Real> albedo(const AlbedoOf<Real>& a) const {
+        return f0 * (a.whole - a.dielectric) + RgbOf<Real>(f90 * a.dielectric) + multiple * (1.f - a.whole);
     }
 
-    AlbedoTable::Row row;
-    float exactF0 = 0;  ///< of the index
-    Rgb f0;
-    float f90 = 0;
-    Rgb multiple;  ///< Kulla and Conty's factor
-    Rgb mean;      ///< albedo
-    Rgb rest;      ///< 1 / (1 - mean)
+    AlbedoRowOf<Real> row;
+    Real exactF0{};  ///< of the index
+    RgbOf<Real> f0;
+    Real f90{};
+    RgbOf<Real> multiple;  ///< Kulla and Conty's factor
+    RgbOf<Real> mean;      ///< albedo
+    RgbOf<Real> rest;      ///< 1 / (1 - mean)
 };
 
 /// f |cos wi| and the density (per solid angle) with which sample() chooses wi, both without delta lobes.
-struct BsdfValue {
-    Rgb value;
-    float pdf = 0;
+template <class Real>
+struct BsdfValueOf {
+    RgbOf<Real> value;
+    Real pdf{};
 };
+using BsdfValue = BsdfValueOf<float>;
 
-struct BsdfSample {
-    Vec3 wi;               ///< local
-    Rgb weight;            ///< f |cos wi| / pdf; 0: the path ends here
-    float pdf = 0;         ///< of all lobes together; meaningless for delta lobes
-    bool delta = false;    ///< perfectly smooth reflection or refraction
-    bool coat = false;     ///< a delta lobe's: the clear coat, not what lies beneath
-    bool through = false;  ///< wi lies beyond the true surface
+template <class Real>
+struct BsdfSampleOf {
+    Vec3Of<Real> wi;       ///< local
+    RgbOf<Real> weight;    ///< f |cos wi| / pdf; 0: the path ends here
+    Real pdf{};            ///< of all lobes together; meaningless for delta lobes
+    Mask<Real> delta{};    ///< perfectly smooth reflection or refraction
+    Mask<Real> coat{};     ///< a delta lobe's: the clear coat, not what lies beneath
+    Mask<Real> through{};  ///< wi lies beyond the true surface
     /// A delta lobe's: folded back. Light that comes from wi does not go to wo.
-    bool folded = false;
+    Mask<Real> folded{};
 };
+using BsdfSample = BsdfSampleOf<float>;
 
 /// Scattering at a point of a glTF surface, in the local frame whose z axis is the shading normal on the
 /// viewer's side: wo.z > 0. `wo` points to the viewer, `wi` to the light.
@@ -109,29 +119,38 @@ struct BsdfSample {
 /// it likewise.) Diffuse light is too wide for that, it would shine twice where lights set; it is divided by
 /// the part of its lobe that is above the surface.
 ///
-/// `F`: what the surface may have. Parts that F lacks are not compiled.
-template <Features F>
+/// `F`: what the surface may have. Parts that F lacks are not compiled. `Real`: float, or Lanes for four
+/// points of four surfaces, which have neither layers nor glass.
+template <Features F, class Real = float>
 class BasicBsdf {
     static_assert(F.reflection || !(F.layers || F.glass), "layers and glass reflect");
+    static_assert(std::same_as<Real, float> || !(F.layers || F.glass || F.rare), "four at once have neither");
 
   public:
+    using Vector = Vec3Of<Real>;
+    using Colour = RgbOf<Real>;
+    using Surface = SurfaceParametersOf<Real>;
+    using Value = BsdfValueOf<Real>;
+    using Sample = BsdfSampleOf<Real>;
+
     /// `fromInside`: wo is on the back of the surface (matters to glass only).
     /// `coatTable`: of index 1.5.
     /// `trueNormal`: the triangle's, local, on wo's side: trueNormal.z >= 0.
-    BasicBsdf(const SurfaceParameters& surface, const Vec3& wo, bool fromInside, const AlbedoTable& coatTable,
-              const Vec3& trueNormal = {0, 0, 1});
+    BasicBsdf(const Surface& surface, const Vector& wo, Mask<Real> fromInside, const AlbedoTable& coatTable,
+              const Vector& trueNormal = {Real{}, Real{}, Real{} + 1});
 
-    BsdfValue evaluate(const Vec3& wi) const;
+    Value evaluate(const Vector& wi) const;
     /// `direction` chooses within the lobe, `choice` the lobe.
-    BsdfSample sample(Vec2 direction, float choice) const;
+    BsdfSample sample(Vec2 direction, float choice) const requires std::same_as<Real, float>;
+    Sample sample(const Vec2Of<Lanes>& direction, Lanes choice) const requires std::same_as<Real, Lanes>;
 
     /// Estimate of the reflectance (transmission included) towards wo.
-    const Rgb& albedo() const { return albedo_; }
+    const Colour& albedo() const { return albedo_; }
     /// Whether there is a lobe that is not a delta function, so that lights can be sampled.
-    bool hasSmoothLobe() const { return !onlyDelta_; }
+    Mask<Real> hasSmoothLobe() const { return !onlyDelta_; }
     /// What coat and sheen let through of light towards wo: delta lobes beneath them are not reciprocal by
     /// it.
-    float beneath() const { return base_; }
+    Real beneath() const { return base_; }
 
   private:
     enum Lobe : std::size_t { kCoat, kReflection, kDiffuse, kGlass, kSheen, kLobes };
@@ -139,66 +158,68 @@ class BasicBsdf {
     struct Microfacet;
 
     template <bool kImage>
-    BsdfValue lobes(const Vec3& wi) const;
-    Vec3 imageOf(const Vec3& wi) const { return wi - up_ * (2 * dot(wi, up_)); }
+    Value lobes(const Vector& wi) const;
+    Vector imageOf(const Vector& wi) const { return wi - up_ * (2.f * dot(wi, up_)); }
 
-    Rgb baseFresnel(float cosH) const;
+    Colour baseFresnel(Real cosH) const;
     float coatFresnel(float cosH) const;
-    BsdfValue baseReflection(const Vec3& wi) const;
+    Value baseReflection(const Vector& wi) const;
     BsdfValue coatReflection(const Vec3& wi) const;
-    BsdfValue diffuse(const Vec3& wi) const;
-    float retroFactor(const Vec3& wi) const;
+    Value diffuse(const Vector& wi) const;
+    Real retroFactor(const Vector& wi) const;
     BsdfValue glass(const Vec3& wi) const;
     BsdfValue sheen(const Vec3& wi) const;
     void leaveOut(const EffectSet& effects);
-    void leaveAbove();
-    void setReflecting(const SurfaceParameters& s, bool fromInside, float glass, float sheenEnergy);
+    void leaveAbove(Mask<Real> tilted);
+    void setReflecting(const Surface& s, Mask<Real> fromInside, Real glass, Real sheenEnergy);
     struct GlassSplit {
         Rgb reflected;
         Rgb transmitted;
         float reflectProbability;
     };
     GlassSplit splitAt(float cosH) const;
-    BsdfSample mirror(const Rgb& weight, bool coat) const;
+    Sample mirror(const Colour& weight, bool coat) const;
     BsdfSample sampleMicrofacet(float alpha, Vec2 u) const;
     BsdfSample sampleGlass(Vec2 u, float choice) const;
-    BsdfSample finish(Vec3 wi, bool through) const;
-    BsdfSample settled(BsdfSample delta) const;
+    Sample finish(Vector wi, Mask<Real> through) const;
+    Sample settled(Sample delta) const;
 
-    static DielectricLayer layerOf(const SurfaceParameters& s) {
+    static DielectricLayerOf<Real> layerOf(const Surface& s) {
         if constexpr (!F.reflection) return {};
-        return s.layer != nullptr ? *s.layer : DielectricLayer(s);
+        if constexpr (std::same_as<Real, float>)
+            if (s.layer == nullptr) return DielectricLayer(s);
+        return *s.layer;
     }
 
-    Vec3 wo_;
-    Vec3 up_;                ///< the true normal
-    DielectricLayer layer_;  ///< where F reflects
-    float alpha_;
-    float coatAlpha_;
-    float retroRoughness_;   ///< -1: the surface is not of that kind
-    float lambdaO_ = 0;      ///< of the base's GGX at wo
-    float coatLambdaO_ = 0;  ///< of the coat's
-    bool smooth_;            ///< the base reflects as a delta function
-    bool coatSmooth_;
+    Vector wo_;
+    Vector up_;                      ///< the true normal
+    DielectricLayerOf<Real> layer_;  ///< where F reflects
+    Real alpha_;
+    Real coatAlpha_;
+    Real retroRoughness_;  ///< -1: the surface is not of that kind
+    Real lambdaO_{};       ///< of the base's GGX at wo
+    Real coatLambdaO_{};   ///< of the coat's
+    Mask<Real> smooth_;    ///< the base reflects as a delta function
+    Mask<Real> coatSmooth_;
     bool glassSmooth_ = true;
-    bool onlyDelta_;
+    Mask<Real> onlyDelta_;
 
-    float coat_;  ///< clearcoat factor
-    Rgb sheen_;   ///< colour, scaled by what the coat lets through
-    float sheenRoughness_ = 0;
-    float coatAlbedo_ = 0;
-    float base_;    ///< what coat and sheen let through
-    float metal_;   ///< how much of each there is: metal,
-    float opaque_;  ///< opaque dielectric
-    Rgb metalF0_;
-    Rgb multiple_;           ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
-    Rgb diffuse_;            ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
-    float glassWeight_ = 0;  ///< includes the multiple-scattering compensation
-    Rgb glassTint_;
-    float ior_;
-    float eta_;  ///< far side over near side
-    Rgb albedo_;
-    std::array<float, kLobes> probability_{};
+    Real coat_;     ///< clearcoat factor
+    Colour sheen_;  ///< colour, scaled by what the coat lets through
+    Real sheenRoughness_{};
+    Real coatAlbedo_{};
+    Real base_;    ///< what coat and sheen let through
+    Real metal_;   ///< how much of each there is: metal,
+    Real opaque_;  ///< opaque dielectric
+    Colour metalF0_;
+    Colour multiple_;     ///< factor of the multiple-scattering lobe, everything but (1 - whole(wi))
+    Colour diffuse_;      ///< factor of the diffuse lobe, everything but (1 - Ed(wi))
+    Real glassWeight_{};  ///< includes the multiple-scattering compensation
+    Colour glassTint_;
+    Real ior_;
+    Real eta_;  ///< far side over near side
+    Colour albedo_;
+    std::array<Real, kLobes> probability_{};
 };
 
 /// Of any surface.

@@ -27,10 +27,28 @@ struct alignas(16) Albedo {
     Lanes lanes() const { return std::bit_cast<Lanes>(*this); }
 };
 
+/// Four of them.
+struct AlbedoLanes {
+    Lanes whole, conductor, dielectric;
+};
+
+template <class Real>
+struct AlbedoOfReal {
+    using Type = Albedo;
+};
+template <>
+struct AlbedoOfReal<Lanes> {
+    using Type = AlbedoLanes;
+};
+template <class Real>
+using AlbedoOf = typename AlbedoOfReal<Real>::Type;
+
 /// How far the exact Fresnel reflectance at cosTheta has risen from normal (0) to grazing incidence (1).
 /// Where glTF's sample code has Schlick's (1 - cos)^5: that is 15 % too low at 65 degrees for glass.
-inline float dielectricWeight(float cosTheta, float eta, float f0) {
-    return f0 < 1 ? std::max(0.f, (dielectricFresnel(cosTheta, eta) - f0) / (1 - f0)) : 1.f;
+template <class Real>
+Real dielectricWeight(Real cosTheta, Real eta, Real f0) {
+    const Real risen = larger(Real{}, (dielectricFresnel(cosTheta, eta) - f0) / (1.f - f0));
+    return f0 < 1.f ? risen : spread<Real>(1);
 }
 
 /// Reflectance of a boundary at normal incidence.
@@ -48,6 +66,17 @@ inline TablePosition tablePosition(float coordinate, std::size_t size) {
     return {cell, scaled - static_cast<float>(cell)};
 }
 
+inline std::array<TablePosition, kLanes> tablePositions(Lanes coordinate, std::size_t size) {
+    const Lanes scaled = clamped(coordinate, Lanes{}, spread<Lanes>(1)) * static_cast<float>(size - 1);
+    const auto last = static_cast<std::int32_t>(size - 2);
+    LaneMask cell = __builtin_convertvector(scaled, LaneMask);
+    cell = cell > last ? LaneMask{} + last : cell;
+    const Lanes t = scaled - __builtin_convertvector(cell, Lanes);
+    std::array<TablePosition, kLanes> out;
+    for (std::size_t i = 0; i < kLanes; ++i) out[i] = {static_cast<std::size_t>(cell[i]), t[i]};
+    return out;
+}
+
 /// Albedo over the cosine to the normal and the roughness, and its cosine-weighted mean, for one index of
 /// refraction: what multiple-scattering compensation needs (Kulla, Conty, "Revisiting physically based
 /// shading at Imageworks", 2017). Computed once by quasi-Monte Carlo over visible normals; energy is kept to
@@ -59,13 +88,19 @@ class AlbedoTable {
     /// The table at one roughness, ready for look-ups by cosine.
     class Row {
       public:
-        Albedo at(float cosTheta) const;
+        Albedo at(float cosTheta) const { return between(tablePosition(rootOf(cosTheta), kSize)); }
         const Albedo& mean() const { return mean_; }
         /// The mean over directions above a plane whose normal is tilted.
         Albedo meanAbove(float cosTilt) const;
 
       private:
         friend class AlbedoTable;
+        friend struct AlbedoRowLanes;
+        template <class Real>
+        static Real rootOf(Real cosTheta) {
+            return squareRoot(larger(Real{}, cosTheta));
+        }
+        Albedo between(const TablePosition& cosine) const;
         const AlbedoTable* table_ = nullptr;
         std::uint32_t index_ = 0;  ///< between this roughness and the next
         float t_ = 0;
@@ -79,6 +114,7 @@ class AlbedoTable {
     float meanWeight() const { return meanWeight_; }
 
   private:
+    friend struct AlbedoRowLanes;
     static constexpr std::size_t kSize = 32;
     float ior_;
     float meanWeight_ = 0;
@@ -105,11 +141,48 @@ inline Albedo AlbedoTable::Row::meanAbove(float cosTilt) const {
     return (low[k] * (1 - t) + low[k + 1] * t) * (1 - t_) + (high[k] * (1 - t) + high[k + 1] * t) * t_;
 }
 
-inline Albedo AlbedoTable::Row::at(float cosTheta) const {
-    const auto [j, t] = tablePosition(std::sqrt(std::max(0.f, cosTheta)), kSize);
+inline Albedo AlbedoTable::Row::between(const TablePosition& cosine) const {
+    const auto [j, t] = cosine;
     const auto &low = table_->cells_[index_], &high = table_->cells_[index_ + 1];
     return (low[j] * (1 - t) + low[j + 1] * t) * (1 - t_) + (high[j] * (1 - t) + high[j + 1] * t) * t_;
 }
+
+/// Rows of four surfaces.
+struct AlbedoRowLanes {
+    std::array<AlbedoTable::Row, kLanes> rows;
+
+    AlbedoLanes at(Lanes cosTheta) const {
+        const std::array<TablePosition, kLanes> at =
+            tablePositions(AlbedoTable::Row::rootOf(cosTheta), AlbedoTable::kSize);
+        return of([&](std::size_t i) { return rows[i].between(at[i]); });
+    }
+    AlbedoLanes mean() const {
+        return of([&](std::size_t i) { return rows[i].mean(); });
+    }
+    AlbedoLanes meanAbove(Lanes cosTilt) const {
+        return of([&](std::size_t i) { return rows[i].meanAbove(cosTilt[i]); });
+    }
+
+  private:
+    template <class Function>
+    static AlbedoLanes of(const Function& albedo) {
+        const Albedo a = albedo(0), b = albedo(1), c = albedo(2), d = albedo(3);
+        return {Lanes{a.whole, b.whole, c.whole, d.whole},
+                Lanes{a.conductor, b.conductor, c.conductor, d.conductor},
+                Lanes{a.dielectric, b.dielectric, c.dielectric, d.dielectric}};
+    }
+};
+
+template <class Real>
+struct AlbedoRowOfReal {
+    using Type = AlbedoTable::Row;
+};
+template <>
+struct AlbedoRowOfReal<Lanes> {
+    using Type = AlbedoRowLanes;
+};
+template <class Real>
+using AlbedoRowOf = typename AlbedoRowOfReal<Real>::Type;
 
 /// Fraction of energy that single-scattering GGX reflection and refraction keep together at a dielectric
 /// boundary of one index of refraction, seen from each side.
