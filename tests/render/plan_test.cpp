@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <span>
 
 #include "../base/temporary_folder.h"
 #include "render/film/append.h"
@@ -255,6 +256,14 @@ struct Shot {
     }
 };
 
+void expectSameBits(const PathSample& a, const PathSample& b, std::size_t i) {
+    EXPECT_EQ(a.radiance, b.radiance) << i;
+    EXPECT_EQ(a.albedo, b.albedo) << i;
+    EXPECT_EQ(a.normal, b.normal) << i;
+    EXPECT_EQ(a.depth, b.depth) << i;
+    EXPECT_EQ(a.hit, b.hit) << i;
+}
+
 /// A small picture as renderDump takes it.
 Shot shoot(Scene scene, const std::string& effects, std::uint64_t seed = 1,
            std::uint32_t samples = kSamples) {
@@ -269,22 +278,28 @@ Shot shoot(Scene scene, const std::string& effects, std::uint64_t seed = 1,
     for (std::size_t i = 0; i < scene.shapes.size(); ++i) shot.kernels.push_back(tracer.featuresAt(i));
     for (auto& c : effectCounters) c = 0;
     std::vector<Splat> splats;
+    std::vector<CameraSample> all;
     for (int i = 0; i < kSide * kSide; ++i)
         for (std::uint32_t s = 0; s < samples; ++s)
-            shot.samples.push_back(
-                tracer.trace(sampleInPixel(i % kSide, i / kSide, hashOf(seed, i), s), splats));
+            all.push_back(sampleInPixel(i % kSide, i / kSide, hashOf(seed, i), s));
+    shot.samples.resize(all.size());
+    tracer.trace(all, shot.samples, splats);
+    // Whatever it is traced with, a sample is the same.
+    for (std::size_t i = 0; i < all.size(); ++i)
+        expectSameBits(shot.samples[i], tracer.trace(all[i], splats), i);
+    constexpr std::size_t kFew = 7;
+    std::vector<PathSample> few(kFew);
+    tracer.trace(std::span(all).last(kFew), few, splats);
+    for (std::size_t i = 0; i < kFew; ++i)
+        expectSameBits(shot.samples[all.size() - kFew + i], few[i], all.size() - kFew + i);
     for (std::size_t e = 0; e < kEffects; ++e) shot.counts[e] = effectCounters[e];
     return shot;
 }
 
 void expectSameBits(const Shot& a, const Shot& b) {
     ASSERT_EQ(a.samples.size(), b.samples.size());
-    for (std::size_t i = 0; i < a.samples.size(); ++i) {
-        ASSERT_EQ(a.samples[i].radiance, b.samples[i].radiance) << i;
-        ASSERT_EQ(a.samples[i].albedo, b.samples[i].albedo) << i;
-        ASSERT_EQ(a.samples[i].normal, b.samples[i].normal) << i;
-        ASSERT_EQ(a.samples[i].depth, b.samples[i].depth) << i;
-    }
+    for (std::size_t i = 0; i < a.samples.size() && !testing::Test::HasFailure(); ++i)
+        expectSameBits(a.samples[i], b.samples[i], i);
 }
 
 class EachEffect : public testing::TestWithParam<std::size_t> {

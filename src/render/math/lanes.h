@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 /// Four floats side by side, and what formulas that are written once for a float and for four (`Real`) use.

@@ -22,11 +22,6 @@ RgbOf<Real> minimum(const RgbOf<Real>& a, float b) {
     return {smaller(a.x, spread<Real>(b)), smaller(a.y, spread<Real>(b)), smaller(a.z, spread<Real>(b))};
 }
 
-/// White, or a grey.
-template <class Real>
-RgbOf<Real> grey(Real v) {
-    return RgbOf<Real>(v);
-}
 template <class Real>
 RgbOf<Real> white() {
     return RgbOf<Real>(spread<Real>(1));
