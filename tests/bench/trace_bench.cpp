@@ -23,9 +23,8 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// One sample in each pixel, in streams as large as a picture's (band_tracer.cpp).
+/// One sample in each pixel, in streams.
 void trace(const Integrator& integrator) {
-    constexpr std::size_t kStream = 512;
     std::vector<CameraSample> samples;
     std::vector<PathSample> found(kStream);
     std::vector<Splat> splats;

@@ -154,10 +154,15 @@ TEST(VlxTrace, ExplainsWhatTheSceneCallsFor) {
     EXPECT_GE(byName["indirect"]["share"].get<double>(), 0);
     EXPECT_FALSE(byName["depth_of_field"]["planned"].get<bool>());
     EXPECT_FALSE(byName["depth_of_field"].contains("share"));
+    double met = 0;
+    for (const auto& kernel : j["hits"]) met += kernel["share"].get<double>();
+    EXPECT_NEAR(met, 1, 0.01);
+    EXPECT_EQ(j["hits"][0]["kernel"], "reflecting");
 
     const ToolRun text = trace({kScene, "--explain"});
     ASSERT_EQ(text.exitCode, 0) << text.err;
     EXPECT_NE(text.out.find("sphere_lights      no"), std::string::npos) << text.out;
+    EXPECT_NE(text.out.find(" % reflecting; "), std::string::npos) << text.out;
 }
 
 TEST(VlxTrace, EffectsLeftOutAreWarnedOfAndInTheHeader) {

@@ -77,7 +77,7 @@ std::vector<Case> whiteCases(const std::vector<float>& roughnesses = {0.f, 0.05f
                                 c.surface.clearcoatRoughness = coat == 1 ? 0.f : 0.4f;
                                 c.surface.ior = ior;
                                 c.surface.albedoTable = &table(ior);
-                                c.surface.glassTable = &glass(ior);
+                                c.surface.glassTable = {&glass(ior)};
                                 c.wo = viewFrom(cosTheta);
                                 c.fromInside = inside;
                                 cases.push_back(c);

@@ -7,7 +7,7 @@
 namespace vlx::render {
 namespace {
 
-/// A surface without layers and glass, and what is asked of it.
+/// A surface, and what is asked of it.
 struct Question {
     SurfaceParameters surface;
     Vec3 wo, up, wi;
@@ -18,6 +18,8 @@ struct Question {
 
 class Questions {
   public:
+    explicit Questions(bool layered) : layered_(layered) {}
+
     Question next() {
         Question q;
         SurfaceParameters& s = q.surface;
@@ -28,6 +30,15 @@ class Questions {
         s.retro = number() < 0.3f;
         s.specular = oneOf({0, 1, number()});
         s.specularColour = {number(), number(), number()};
+        if (layered_) {
+            s.transmission = oneOf({0, 0, 1, number()});
+            s.clearcoat = oneOf({0, 0, 1, number()});
+            s.clearcoatRoughness = oneOf({0, 1, number()});
+            if (number() < 0.3f) s.sheenColour = {number(), number(), number()};
+            s.sheenRoughness = number();
+            s.sheenTable = {&sheen_};
+            if (number() < 0.8f) s.glassTable = {&glass_};
+        }
         q.wo = direction(oneOf({1e-3f, 1, number()}));
         q.up = number() < 0.5f ? Vec3{0, 0, 1} : direction(0.3f + 0.7f * number());
         q.wi = direction(2 * number() - 1);
@@ -47,17 +58,20 @@ class Questions {
 
     std::mt19937_64 random_{5};
     AlbedoTable table_{1.5f};
+    GlassTable glass_{1.5f};
+    SheenTable sheen_;
+    bool layered_;
 };
 
 template <Features F>
 void expectBitsOfEach() {
-    Questions questions;
+    Questions questions(F.layers);
     const AlbedoTable coat(1.5f);
     std::array<int, 2> found{};  // paths that end, and that go on
     for (int k = 0; k < 5000; ++k) {
         const std::array<Question, kLanes> q = {questions.next(), questions.next(), questions.next(),
                                                 questions.next()};
-        const FourSurfaces surfaces([&](std::size_t i) { return q[i].surface; });
+        const FourSurfaces<F> surfaces([&](std::size_t i) { return q[i].surface; });
         const BasicBsdf<F, Lanes> four(*surfaces, vectorsOf([&](std::size_t i) { return q[i].wo; }),
                                        maskOf([&](std::size_t i) { return q[i].fromBehind; }), coat,
                                        vectorsOf([&](std::size_t i) { return q[i].up; }));
@@ -90,6 +104,7 @@ void expectBitsOfEach() {
 }
 
 TEST(FourSurfaces, GiveTheBitsOfEachThatReflects) { expectBitsOfEach<kReflecting>(); }
+TEST(FourSurfaces, GiveTheBitsOfEachWithLayersAndGlass) { expectBitsOfEach<kLayered>(); }
 TEST(FourSurfaces, GiveTheBitsOfEachThatIsMatte) { expectBitsOfEach<kMatte>(); }
 
 }  // namespace

@@ -136,8 +136,8 @@ void bindOptions(CLI::App& app, TraceOptions& o) {
               "sample; auto: where the scene may call for it, a short pilot decides");
     app.add_flag("--explain{text}", o.explain,
                  "Print which effects the scene calls for, why, what part of the time each takes\n"
-                 "(from a short pilot), and which integrator is chosen, and end; --explain=json: the "
-                 "same as JSON")
+                 "(from a short pilot), what surfaces paths meet, which integrator is chosen, and end; "
+                 "--explain=json: the same as JSON")
         ->check(CLI::IsMember({"text", "json"}));
     app.add_option("--shutter", o.shutter,
                    "When the shutter opens and closes, in seconds of the scene's animations\n"

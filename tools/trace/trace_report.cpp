@@ -32,6 +32,7 @@ int printCameras(const TraceOptions& o, const Scene& loaded) {
 
 int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, const IntegratorChoice& choice) {
     const auto shares = pilotShares(loaded, plan, o.render);
+    const auto hits = pilotHits(loaded, o.render);
     if (o.explain == "json") {
         nlohmann::ordered_json list = nlohmann::ordered_json::array();
         for (const PlannedEffect& e : plan.effects) {
@@ -44,8 +45,13 @@ int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, cons
         const nlohmann::ordered_json features{{"albedo", plan.features.albedo},
                                               {"normal", plan.features.normalAndDepth},
                                               {"depth", plan.features.normalAndDepth}};
+        nlohmann::ordered_json met = nlohmann::ordered_json::array();
+        for (std::size_t k = 0; k < hits.size(); ++k)
+            if (hits[k] > 0)
+                met.push_back({{"kernel", kKernelNames[k]}, {"share", std::round(hits[k] * 1000) / 1000}});
         const nlohmann::ordered_json chosen{{"chosen", nameOf(choice.chosen)}, {"reason", choice.reason}};
         std::cout << nlohmann::ordered_json{{"effects", list},
+                                            {"hits", met},
                                             {"lights", loaded.lights.size()},
                                             {"recorded", features},
                                             {"integrator", chosen}}
@@ -60,6 +66,12 @@ int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, cons
         std::printf("%-19s%-9s%-7s%s\n", std::string(nameOf(e.effect)).c_str(), e.planned ? "yes" : "no",
                     cost.c_str(), e.reason.c_str());
     }
+    std::string met;
+    for (std::size_t k = 0; k < hits.size(); ++k)
+        if (hits[k] > 0)
+            met += (met.empty() ? "" : "; ") + std::to_string(std::lround(hits[k] * 100)) + " % " +
+                   std::string(kKernelNames[k]);
+    if (!met.empty()) std::printf("surfaces that paths meet: %s\n", met.c_str());
     if (!plan.features.albedo)
         std::printf("not recorded: %s, %s\n",
                     plan.features.normalAndDepth ? "albedo" : "albedo, normal and depth",

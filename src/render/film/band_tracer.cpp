@@ -9,9 +9,6 @@
 namespace vlx::render {
 namespace {
 
-/// Paths that are traced together, at most: at some 600 bytes each they fit into a core's cache.
-constexpr std::size_t kStream = 512;
-
 /// The part of region (rx, ry) inside `window`.
 Window clipped(int rx, int ry, const Window& window) {
     const int x0 = std::max(rx * kRegionSize, window.x), y0 = std::max(ry * kRegionSize, window.y);

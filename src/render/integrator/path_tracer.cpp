@@ -23,6 +23,8 @@ constexpr std::array kKernels = [] {
                       of.operator()<kEveryFeature>()};
 }();
 
+static_assert(kKernels.size() == kKernelNames.size());
+
 bool covers(const Features& kernel, const Features& wanted) {
     const auto implies = [](bool a, bool b) { return !a || b; };
     return implies(wanted.reflection, kernel.reflection) && implies(wanted.layers, kernel.layers) &&
@@ -72,6 +74,20 @@ PathSample PathTracer::along(const Ray& ray, const PathSampler& sampler) const {
 
 void PathTracer::trace(std::span<const CameraSample> samples, std::span<PathSample> found,
                        std::vector<Splat>&) const {
+    Hits hits{};
+    follow(samples, found, hits);
+}
+
+PathTracer::Hits PathTracer::hits(std::span<const CameraSample> samples) const {
+    std::vector<PathSample> found(samples.size());
+    Hits hits{};
+    follow(samples, found, hits);
+    return hits;
+}
+
+void PathTracer::follow(std::span<const CameraSample> samples, std::span<PathSample> found,
+                        Hits& hits) const {
+    const Scene& scene = context_.scene;
     std::vector<StreamedPath> paths;
     paths.reserve(samples.size());
     std::vector<StreamedPath*> alive;
@@ -84,12 +100,12 @@ void PathTracer::trace(std::span<const CameraSample> samples, std::span<PathSamp
         for (StreamedPath* p : alive)
             if (const std::optional<Hit> hit = meetNext(p->path, p->estimate)) {
                 p->hit = *hit;
-                const Shape& shape = context_.scene.shapes[hit->shape];
-                __builtin_prefetch(&context_.scene.triangles[shape.firstTriangle + hit->triangle]);
+                __builtin_prefetch(&scene.triangles[scene.shapes[hit->shape].firstTriangle + hit->triangle]);
                 met[kernels_[hit->shape]].push_back(p);
             }
         alive.clear();
         for (std::size_t k = 0; k < kKernels.size(); ++k) {
+            hits[k] += met[k].size();
             kKernels[k].scatterAll(met[k], alive);
             met[k].clear();
         }

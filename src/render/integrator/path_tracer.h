@@ -22,6 +22,10 @@ class PathTracer final : public Integrator {
     void trace(std::span<const CameraSample> samples, std::span<PathSample> found,
                std::vector<Splat>& splats) const override;
 
+    /// How many of the surfaces that the samples' paths meet each kernel works on, as in kKernelNames.
+    using Hits = std::array<std::uint64_t, kKernelNames.size()>;
+    Hits hits(std::span<const CameraSample> samples) const;
+
     /// What comes in along any ray.
     PathSample along(const Ray& ray, const PathSampler& sampler) const;
 
@@ -33,6 +37,8 @@ class PathTracer final : public Integrator {
                         Rgb*) const override {
         return along(ray, sampler);
     }
+
+    void follow(std::span<const CameraSample> samples, std::span<PathSample> found, Hits& hits) const;
 
     PathContext context_;
     std::vector<std::uint8_t> kernels_;  ///< of each shape

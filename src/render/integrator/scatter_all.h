@@ -34,7 +34,7 @@ void scatterFour(std::span<StreamedPath* const> met, std::vector<StreamedPath*>&
     }
     if (!any) return;
 
-    const FourSurfaces surfaces(
+    const FourSurfaces<F> surfaces(
         [&](std::size_t i) { return pathAt(i).path.walk.template parameters<F>(pointAt(i)); });
     const Side<F, Lanes> side(in.scene.albedoTables[0],
                               vectorsOf([&](std::size_t i) { return pointAt(i).shadingNormal; }),
@@ -99,7 +99,7 @@ inline void prefetchCorners(const Scene& scene, const Hit& hit) {
 
 template <Features F>
 void scatterAll(std::span<StreamedPath* const> met, std::vector<StreamedPath*>& alive) {
-    if constexpr (F.layers || F.glass || F.rare) {
+    if constexpr (F.rare) {
         for (StreamedPath* p : met)
             if (scatterAt<F>(p->path, p->hit, p->sampler, p->estimate)) alive.push_back(p);
     } else {

@@ -80,6 +80,25 @@ constexpr Real spread(float v) {
     return Real{} + v;
 }
 
+/// True in every lane.
+template <class Real>
+constexpr Mask<Real> always() {
+    return Real{} == 0;
+}
+
+/// f(i) of each lane where `there` is, 0 elsewhere.
+template <class Function>
+float eachLane(bool there, const Function& f) {
+    return there ? f(0) : 0.f;
+}
+template <class Function>
+Lanes eachLane(LaneMask there, const Function& f) {
+    Lanes v{};
+    for (std::size_t i = 0; i < kLanes; ++i)
+        if (there[i] != 0) v[i] = f(i);
+    return v;
+}
+
 inline float laneOf(float v, std::size_t) { return v; }
 inline float laneOf(Lanes v, std::size_t i) { return v[i]; }
 

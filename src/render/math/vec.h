@@ -73,6 +73,7 @@ constexpr Vec3Of<Real> everywhere(const Vec3& v) {
     return {spread<Real>(v.x), spread<Real>(v.y), spread<Real>(v.z)};
 }
 
+inline const Vec3& lane(const Vec3& v, std::size_t) { return v; }
 inline Vec3 lane(const Vec3Of<Lanes>& v, std::size_t i) { return {v.x[i], v.y[i], v.z[i]}; }
 /// Side by side, of f(0) to f(3).
 template <class Function>

@@ -5,9 +5,11 @@
 #include <ctime>
 #include <limits>
 #include <memory>
+#include <numeric>
+#include <span>
 #include <vector>
 
-#include "render/integrator/integrator.h"
+#include "render/integrator/path_tracer.h"
 #include "render/scene/camera.h"
 #include "variolux/base/hash.h"
 #include "variolux/base/parallel.h"
@@ -23,6 +25,23 @@ double threadSeconds() {
     timespec t{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// Of pixels of a grid over the picture.
+std::vector<CameraSample> gridSamples(const RenderOptions& options) {
+    std::vector<CameraSample> samples;
+    for (int i = 0; i < kGridSide * kGridSide; ++i)
+        for (std::uint32_t s = 0; s < kSamples; ++s) {
+            CameraSample sample;
+            sample.x =
+                (static_cast<float>(i % kGridSide) + 0.5f) / kGridSide * static_cast<float>(options.width);
+            sample.y =
+                (static_cast<float>(i / kGridSide) + 0.5f) / kGridSide * static_cast<float>(options.height);
+            sample.seed = hashOf(options.seed, i);
+            sample.index = s;
+            samples.push_back(sample);
+        }
+    return samples;
 }
 
 /// A scene without one effect, ready to be traced.
@@ -66,21 +85,13 @@ struct Variant {
     }
 
     double run(const RenderOptions& options) const {
+        const std::vector<CameraSample> samples = gridSamples(options);
+        std::vector<PathSample> found(kStream);
         std::vector<Splat> splats;
         const double start = threadSeconds();
-        for (int i = 0; i < kGridSide * kGridSide; ++i) {
-            const float x =
-                (static_cast<float>(i % kGridSide) + 0.5f) / kGridSide * static_cast<float>(options.width);
-            const float y =
-                (static_cast<float>(i / kGridSide) + 0.5f) / kGridSide * static_cast<float>(options.height);
-            for (std::uint32_t s = 0; s < kSamples; ++s) {
-                CameraSample sample;
-                sample.x = x;
-                sample.y = y;
-                sample.seed = hashOf(options.seed, i);
-                sample.index = s;
-                integrator->trace(sample, splats);
-            }
+        for (std::size_t i = 0; i < samples.size(); i += kStream) {
+            const std::size_t count = std::min(kStream, samples.size() - i);
+            integrator->trace(std::span(samples).subspan(i, count), std::span(found).first(count), splats);
         }
         return threadSeconds() - start;
     }
@@ -90,6 +101,25 @@ struct Variant {
     std::unique_ptr<Accelerator> ownAccelerator;
     std::unique_ptr<Integrator> integrator;
 };
+
+/// Mean over the channels of a sample's variance / (mean^2 + 0.01).
+double relativeVariance(std::span<const PathSample> pixel) {
+    const auto n = static_cast<double>(pixel.size());
+    std::array<double, 3> sum{}, squares{};
+    for (const PathSample& s : pixel) {
+        const std::array<double, 3> rgb{s.radiance.x, s.radiance.y, s.radiance.z};
+        for (std::size_t c = 0; c < 3; ++c) {
+            sum[c] += rgb[c];
+            squares[c] += rgb[c] * rgb[c];
+        }
+    }
+    double error = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double mean = sum[c] / n;
+        error += std::max(0.0, squares[c] / n - mean * mean) * n / (n - 1) / (mean * mean + 0.01) / 3;
+    }
+    return error;
+}
 
 }  // namespace
 
@@ -113,6 +143,18 @@ std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, cons
     return shares;
 }
 
+std::array<double, kKernelNames.size()> pilotHits(const Scene& scene, const RenderOptions& options) {
+    const Accelerator accelerator(scene, options.path.effects);
+    const PathTracer tracer(scene, accelerator,
+                            View(scene.cameras[options.camera], options.width, options.height), options.path);
+    const PathTracer::Hits hits = tracer.hits(gridSamples(options));
+    const auto all = static_cast<double>(std::accumulate(hits.begin(), hits.end(), std::uint64_t{0}));
+    std::array<double, kKernelNames.size()> shares{};
+    for (std::size_t k = 0; k < hits.size(); ++k)
+        shares[k] = all > 0 ? static_cast<double>(hits[k]) / all : 0;
+    return shares;
+}
+
 PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, const RenderOptions& options,
                           double atLeast) {
     using Clock = std::chrono::steady_clock;
@@ -125,31 +167,32 @@ PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, co
     double variance = 0;
     int rounds = 0;
     const auto start = Clock::now();
+    constexpr std::size_t kTogether = kStream / kPerPixel;
+    static_assert(kPixels % kTogether == 0);
     do {
         std::vector<double> errors(kPixels);
-        parallelFor(0, kPixels, [&](std::int64_t i) {
-            // Points of the plane's sequence, mixed, so that a round's pixels are all over the picture.
-            const SobolPoint p = scrambledSobolPoint(static_cast<std::uint32_t>(rounds * kPixels + i),
-                                                     SobolSeeds::from(0x70696cu));
-            const int column = window.x + static_cast<int>(unitFloat(p.x) * static_cast<float>(window.width));
-            const int row = window.y + static_cast<int>(unitFloat(p.y) * static_cast<float>(window.height));
-            std::array<double, 3> sum{}, squares{};
+        parallelFor(0, kPixels / kTogether, [&](std::int64_t stream) {
+            std::vector<CameraSample> samples;
+            for (std::size_t i = 0; i < kTogether; ++i) {
+                const auto pixel =
+                    static_cast<std::uint32_t>(static_cast<std::size_t>(stream) * kTogether + i);
+                // Points of the plane's sequence, mixed, so that a round's pixels are all over the picture.
+                const SobolPoint p = scrambledSobolPoint(static_cast<std::uint32_t>(rounds) * kPixels + pixel,
+                                                         SobolSeeds::from(0x70696cu));
+                const int column =
+                    window.x + static_cast<int>(unitFloat(p.x) * static_cast<float>(window.width));
+                const int row =
+                    window.y + static_cast<int>(unitFloat(p.y) * static_cast<float>(window.height));
+                const std::uint64_t seed = hashOf(options.seed, 0x70696cu, rounds, pixel);
+                for (std::uint32_t s = 0; s < kPerPixel; ++s)
+                    samples.push_back(sampleInPixel(column, row, seed, s));
+            }
+            std::vector<PathSample> found(samples.size());
             std::vector<Splat> splats;
-            for (std::uint32_t s = 0; s < kPerPixel; ++s) {
-                const std::uint64_t seed = hashOf(options.seed, 0x70696cu, rounds, i);
-                const Rgb v = integrator->trace(sampleInPixel(column, row, seed, s), splats).radiance;
-                const std::array<double, 3> rgb{v.x, v.y, v.z};
-                for (std::size_t c = 0; c < 3; ++c) {
-                    sum[c] += rgb[c];
-                    squares[c] += rgb[c] * rgb[c];
-                }
-            }
-            for (std::size_t c = 0; c < 3; ++c) {
-                const double mean = sum[c] / kPerPixel;
-                const double v =
-                    std::max(0.0, squares[c] / kPerPixel - mean * mean) * kPerPixel / (kPerPixel - 1);
-                errors[static_cast<std::size_t>(i)] += v / (mean * mean + 0.01) / 3;
-            }
+            integrator->trace(samples, found, splats);
+            for (std::size_t i = 0; i < kTogether; ++i)
+                errors[static_cast<std::size_t>(stream) * kTogether + i] =
+                    relativeVariance(std::span(found).subspan(i * kPerPixel, kPerPixel));
         });
         for (const double e : errors) variance += e / kPixels;
         ++rounds;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "render/film/render.h"
+#include "render/plan/kernel_features.h"
 #include "render/plan/plan.h"
 
 namespace vlx::render {
@@ -14,6 +15,10 @@ namespace vlx::render {
 /// `scene`: the plan applied; `options`: of the picture.
 std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, const Plan& plan,
                                                         const RenderOptions& options);
+
+/// Part of the surfaces met by paths that each of the path tracer's kernels works on, as in kKernelNames: of
+/// the same samples. 0 for all where nothing is met.
+std::array<double, kKernelNames.size()> pilotHits(const Scene& scene, const RenderOptions& options);
 
 /// What a few samples, spread over the picture, say of all.
 struct PilotMeasure {

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <string_view>
+
 namespace vlx::render {
 
 /// Which parts of the tracer a kernel is compiled with. A part that is missing must not be called for by any
@@ -23,5 +26,8 @@ inline constexpr Features kLayered{.reflection = true, .layers = true, .glass = 
 inline constexpr Features kLayeredTextured{
     .reflection = true, .layers = true, .glass = true, .textures = true};
 inline constexpr Features kEveryFeature{true, true, true, true, true};
+inline constexpr std::array<std::string_view, 7> kKernelNames = {
+    "matte",   "matte, textured",   "reflecting", "reflecting, textured",
+    "layered", "layered, textured", "everything"};
 
 }  // namespace vlx::render

@@ -166,9 +166,9 @@ SurfaceParameters plainParameters(const Scene& scene, const Material& m) {
     s.clearcoatRoughness = m.clearcoatRoughness;
     s.sheenColour = m.sheenColour;
     s.sheenRoughness = m.sheenRoughness;
-    if (!isBlack(m.sheenColour)) s.sheenTable = scene.sheenTables.data();
+    if (!isBlack(m.sheenColour)) s.sheenTable = {scene.sheenTables.data()};
     s.albedoTable = &scene.albedoTables[static_cast<std::size_t>(m.albedoTable)];
-    if (m.glassTable >= 0) s.glassTable = &scene.glassTables[static_cast<std::size_t>(m.glassTable)];
+    if (m.glassTable >= 0) s.glassTable = {&scene.glassTables[static_cast<std::size_t>(m.glassTable)]};
     return s;
 }
 

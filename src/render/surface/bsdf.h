@@ -23,18 +23,18 @@ RgbOf<Real> BasicBsdf<F, Real>::baseFresnel(Real cosH) const {
 }
 
 template <Features F, class Real>
-float BasicBsdf<F, Real>::coatFresnel(float cosH) const {
-    return coat_ * dielectricFresnel(cosH, kCoatIor);
+Real BasicBsdf<F, Real>::coatFresnel(Real cosH) const {
+    return coat_ * dielectricFresnel(cosH, spread<Real>(kCoatIor));
 }
 
 template <Features F, class Real>
-typename BasicBsdf<F, Real>::GlassSplit BasicBsdf<F, Real>::splitAt(float cosH) const {
-    const float exact = dielectricFresnel(cosH, eta_);
-    const Rgb r = lerp(layer_.f0, Rgb(layer_.f90), dielectricWeight(cosH, eta_, layer_.exactF0));
-    const Rgb t = exact < 1 ? (Rgb(1) - r) * glassTint_ : Rgb(0);
-    const float toReflect = maxComponent(r), toTransmit = maxComponent(t);
-    const float total = toReflect + toTransmit;
-    return {r, t, total > 0 ? toReflect / total : 1};
+typename BasicBsdf<F, Real>::GlassSplit BasicBsdf<F, Real>::splitAt(Real cosH) const {
+    const Real exact = dielectricFresnel(cosH, eta_);
+    const Colour r = lerp(layer_.f0, Colour(layer_.f90), dielectricWeight(cosH, eta_, layer_.exactF0));
+    const Colour t = select(exact < 1, (white<Real>() - r) * glassTint_, Colour{});
+    const Real toReflect = maxComponent(r), toTransmit = maxComponent(t);
+    const Real total = toReflect + toTransmit;
+    return {r, t, total > 0 ? toReflect / total : spread<Real>(1)};
 }
 
 /// GGX without its Fresnel factor, and the cosine of half the angle between wo and wi (wi.z > 0).
@@ -59,10 +59,10 @@ BsdfValueOf<Real> BasicBsdf<F, Real>::baseReflection(const Vector& wi) const {
 }
 
 template <Features F, class Real>
-BsdfValue BasicBsdf<F, Real>::coatReflection(const Vec3& wi) const {
+BsdfValueOf<Real> BasicBsdf<F, Real>::coatReflection(const Vector& wi) const {
     countEffect(Effect::Glossy);
     const Microfacet m(coatAlpha_, coatLambdaO_, wo_, wi);
-    return {Rgb(coatFresnel(m.cosH) * m.value), m.pdf};
+    return {Colour(coatFresnel(m.cosH) * m.value), m.pdf};
 }
 
 template <Features F, class Real>
@@ -86,25 +86,36 @@ BsdfValueOf<Real> BasicBsdf<F, Real>::diffuse(const Vector& wi) const {
 }
 
 template <Features F, class Real>
-BsdfValue BasicBsdf<F, Real>::glass(const Vec3& wi) const {
-    countEffect(wi.z > 0 ? Effect::Glossy : Effect::RoughTransmission);
-    const Ggx ggx{alpha_};
-    const float lambdaI = ggx.lambda(wi);
-    const float g1 = 1 / (1 + lambdaO_), g2 = 1 / (1 + lambdaO_ + lambdaI);
-    if (wi.z > 0) {
-        const Vec3 h = normalized(wo_ + wi);
+BsdfValueOf<Real> BasicBsdf<F, Real>::glass(Mask<Real> there, const Vector& wi) const {
+    const GgxOf<Real> ggx{alpha_};
+    const Real lambdaI = ggx.lambda(wi);
+    const Real g1 = 1.f / (1.f + lambdaO_), g2 = 1.f / (1.f + lambdaO_ + lambdaI);
+    Value v;
+    const Mask<Real> above = wi.z > 0;
+    if (const Mask<Real> reflects = there && above; any(reflects)) {
+        countEffect(Effect::Glossy);
+        const Vector h = normalized(wo_ + wi);
         const GlassSplit split = splitAt(dot(wo_, h));
-        const float common = ggx.d(h) / (4 * wo_.z);
-        return {split.reflected * (glassWeight_ * common * g2), split.reflectProbability * common * g1};
+        const Real common = ggx.d(h) / (4.f * wo_.z);
+        v = select(
+            reflects,
+            Value{split.reflected * (glassWeight_ * common * g2), split.reflectProbability * common * g1}, v);
     }
-    Vec3 h = normalized(wo_ + wi * eta_);
-    if (h.z < 0) h = -h;
-    const float cosO = dot(wo_, h), cosI = dot(wi, h);
-    if (cosO <= 0 || cosI >= 0) return {};
-    const GlassSplit split = splitAt(cosO);
-    const float jacobian = eta_ * eta_ * -cosI / square(cosO + eta_ * cosI);  // |dh/dwi|
-    const float common = ggx.d(h) * cosO / wo_.z * jacobian;
-    return {split.transmitted * (glassWeight_ * common * g2), (1 - split.reflectProbability) * common * g1};
+    if (Mask<Real> transmits = there && !above; any(transmits)) {
+        countEffect(Effect::RoughTransmission);
+        Vector h = normalized(wo_ + wi * eta_);
+        h = select(h.z < 0, -h, h);
+        const Real cosO = dot(wo_, h), cosI = dot(wi, h);
+        transmits = transmits && !(cosO <= 0 || cosI >= 0);
+        const GlassSplit split = splitAt(cosO);
+        const Real jacobian = eta_ * eta_ * -cosI / square(cosO + eta_ * cosI);  // |dh/dwi|
+        const Real common = ggx.d(h) * cosO / wo_.z * jacobian;
+        v = select(transmits,
+                   Value{split.transmitted * (glassWeight_ * common * g2),
+                         (1.f - split.reflectProbability) * common * g1},
+                   v);
+    }
+    return v;
 }
 
 /// All smooth lobes at wi, which may be the image of the direction that is asked for.
@@ -124,11 +135,13 @@ BsdfValueOf<Real> BasicBsdf<F, Real>::lobes(const Vector& wi) const {
         if (const Mask<Real> there = has(kReflection) && !smooth_; any(there))
             add(there, baseReflection(wi), kReflection);
     if constexpr (F.layers) {
-        if (has(kCoat) && !coatSmooth_) add(true, coatReflection(wi), kCoat);
-        if (has(kSheen)) add(true, sheen(wi), kSheen);
+        if (const Mask<Real> there = has(kCoat) && !coatSmooth_; any(there))
+            add(there, coatReflection(wi), kCoat);
+        if (const Mask<Real> there = has(kSheen); any(there)) add(there, sheen(there, wi), kSheen);
     }
     if constexpr (F.glass)
-        if (probability_[kGlass] > 0 && !glassSmooth_) add(true, glass(wi), kGlass);
+        if (const Mask<Real> there = probability_[kGlass] > 0 && !glassSmooth_; any(there))
+            add(there, glass(there, wi), kGlass);
     return sum;
 }
 
@@ -176,92 +189,78 @@ BsdfSampleOf<Real> BasicBsdf<F, Real>::mirror(const Colour& weight, bool coat) c
 }
 
 template <Features F, class Real>
-BsdfSample BasicBsdf<F, Real>::sampleMicrofacet(float alpha, Vec2 u) const {
-    const Vec3 wi = reflected(wo_, Ggx{alpha}.sampleVisible(wo_, u));
-    return wi.z > 0 ? finish(wi, false) : BsdfSample{};
+BsdfValueOf<Real> BasicBsdf<F, Real>::sheen(Mask<Real> there, const Vector& wi) const {
+    const Real f = eachLane(there, [&](std::size_t i) {
+        return charlieSheen(lane(wo_, i), lane(wi, i), laneOf(sheenRoughness_, i));
+    });
+    return {sheen_ * (f * wi.z), wi.z * kInvPi};
 }
 
 template <Features F, class Real>
-BsdfSample BasicBsdf<F, Real>::sampleGlass(Vec2 u, float choice) const {
-    const Vec3 h = glassSmooth_ ? Vec3{0, 0, 1} : Ggx{alpha_}.sampleVisible(wo_, u);
-    const GlassSplit split = splitAt(dot(wo_, h));
-    const bool reflects = choice < split.reflectProbability;
-    const Vec3 wi = reflects ? reflected(wo_, h) : refracted(wo_, h, eta_);
-    if (reflects ? wi.z <= 0 : wi.z >= 0) return {};
-    if (!glassSmooth_) return finish(wi, !reflects);
-    countEffect(reflects ? Effect::Mirror : Effect::Transmission);
-    const float scale = glassWeight_ / probability_[kGlass];
-    const Rgb weight = reflects ? split.reflected * (scale / split.reflectProbability)
-                                : split.transmitted * (scale / (1 - split.reflectProbability));
-    return settled({.wi = wi, .weight = weight, .through = !reflects});
-}
-
-template <Features F, class Real>
-BsdfSample BasicBsdf<F, Real>::sample(Vec2 direction, float choice) const requires std::same_as<Real, float> {
-    if constexpr (!F.reflection)
-        return probability_[kDiffuse] > 0 ? finish(cosineHemisphere(direction), false) : BsdfSample{};
-    float rest = choice;
-    if (rest < probability_[kDiffuse]) return finish(cosineHemisphere(direction), false);
-    rest -= probability_[kDiffuse];
-    if constexpr (F.reflection) {
-        if (rest < probability_[kReflection])
-            return smooth_ ? mirror(baseFresnel(wo_.z) / probability_[kReflection], false)
-                           : sampleMicrofacet(alpha_, direction);
-        rest -= probability_[kReflection];
-    }
+BsdfSampleOf<Real> BasicBsdf<F, Real>::sample(const Vec2Of<Real>& direction, Real choice) const {
+    // Lobes share [0, 1) in turn.
+    Mask<Real> open = always<Real>();
+    Real rest = choice;
+    const auto chosen = [&](Lobe lobe) -> Mask<Real> {
+        const Mask<Real> it = open && rest < probability_[lobe];
+        open = open && !it;
+        rest = rest - probability_[lobe];
+        return it;
+    };
+    Mask<Real> cosine = chosen(kDiffuse), reflects{}, coats{};
+    if constexpr (F.reflection) reflects = chosen(kReflection);
     if constexpr (F.layers) {
-        if (rest < probability_[kSheen]) return finish(cosineHemisphere(direction), false);
-        rest -= probability_[kSheen];
-        if (rest < probability_[kCoat])
-            return coatSmooth_ ? mirror(Rgb(coatFresnel(wo_.z) / probability_[kCoat]), true)
-                               : sampleMicrofacet(coatAlpha_, direction);
-        rest -= probability_[kCoat];
+        cosine = cosine || chosen(kSheen);
+        coats = chosen(kCoat);
     }
-    if constexpr (F.glass)
-        if (probability_[kGlass] > 0)
-            return sampleGlass(direction, std::min(rest / probability_[kGlass], 0x1.fffffep-1f));
-    return {};
-}
 
-template <Features F, class Real>
-BsdfValue BasicBsdf<F, Real>::sheen(const Vec3& wi) const {
-    const float pdf = wi.z * kInvPi;
-    return {sheen_ * (charlieSheen(wo_, wi, sheenRoughness_) * wi.z), pdf};
-}
-
-/// Four at once: of diffuse light, and of the base's reflection where there is one.
-template <Features F, class Real>
-BsdfSampleOf<Real> BasicBsdf<F, Real>::sample(const Vec2Of<Lanes>& direction,
-                                              Lanes choice) const requires std::same_as<Real, Lanes> {
-    if constexpr (!F.reflection) {
-        Sample s = finish(cosineHemisphere(direction), LaneMask{});
-        s.weight = select(probability_[kDiffuse] > 0, s.weight, Colour{});
-        return s;
-    } else {
-        const LaneMask diffuse = choice < probability_[kDiffuse];
-        const LaneMask reflects = !diffuse && choice - probability_[kDiffuse] < probability_[kReflection];
-        const LaneMask rough = reflects && !smooth_;
-        Vector wi{Real{}, Real{}, Real{} - 1};  // beneath: where no lobe is
-        if (any(diffuse)) wi = select(diffuse, cosineHemisphere(direction), wi);
-        if (any(rough)) {
-            const Vector w = reflected(wo_, GgxOf<Lanes>{alpha_}.sampleVisible(wo_, direction));
-            wi = select(rough && w.z > 0, w, wi);
+    // Lobes that are not delta functions are weighed together.
+    Vector wi{Real{}, Real{}, Real{} - 1};
+    Mask<Real> smooth{}, through{};
+    Sample s;
+    const auto take = [&](Mask<Real> there, const Vector& w) {
+        wi = select(there, w, wi);
+        smooth = smooth || there;
+    };
+    if (any(cosine)) take(cosine, cosineHemisphere(direction));
+    const auto takeMicrofacet = [&](Mask<Real> there, Real alpha) {
+        if (!any(there)) return;
+        const Vector w = reflected(wo_, GgxOf<Real>{alpha}.sampleVisible(wo_, direction));
+        take(there && w.z > 0, w);
+    };
+    if constexpr (F.reflection) takeMicrofacet(reflects && !smooth_, alpha_);
+    if constexpr (F.layers) takeMicrofacet(coats && !coatSmooth_, coatAlpha_);
+    if constexpr (F.glass) {
+        if (const Mask<Real> glass = open && probability_[kGlass] > 0; any(glass)) {
+            const Real part = smaller(rest / probability_[kGlass], spread<Real>(0x1.fffffep-1f));
+            Vector h{Real{}, Real{}, Real{} + 1};
+            if (any(glass && !glassSmooth_))
+                h = select(glassSmooth_, h, GgxOf<Real>{alpha_}.sampleVisible(wo_, direction));
+            const GlassSplit split = splitAt(dot(wo_, h));
+            const Mask<Real> back = part < split.reflectProbability;
+            const Vector w = select(back, reflected(wo_, h), refracted(wo_, h, eta_));
+            const Mask<Real> leaves = glass && ((back && w.z > 0) || (!back && w.z < 0));
+            through = leaves && !back;
+            take(leaves && !glassSmooth_, w);
+            if (const Mask<Real> delta = leaves && glassSmooth_; any(delta)) {
+                if (any(delta && back)) countEffect(Effect::Mirror);
+                if (any(delta && !back)) countEffect(Effect::Transmission);
+                const Real scale = glassWeight_ / probability_[kGlass];
+                const Colour weight = select(back, split.reflected * (scale / split.reflectProbability),
+                                             split.transmitted * (scale / (1.f - split.reflectProbability)));
+                s = select(delta, settled({.wi = w, .weight = weight, .through = through}), s);
+            }
         }
-        const LaneMask chosen = wi.z > 0;
-        Sample s = finish(wi, LaneMask{});
-        s.weight = select(chosen, s.weight, Colour{});
-        if (const LaneMask smooth = reflects && smooth_; any(smooth)) {
-            const Sample m = mirror(baseFresnel(wo_.z) / probability_[kReflection], false);
-            s = {select(smooth, m.wi, s.wi),
-                 select(smooth, m.weight, s.weight),
-                 smooth ? m.pdf : s.pdf,
-                 smooth,
-                 m.coat & smooth,
-                 m.through & smooth,
-                 m.folded & smooth};
-        }
-        return s;
     }
+    if (any(smooth)) s = select(smooth, finish(wi, through), s);
+
+    if constexpr (F.reflection)
+        if (const Mask<Real> there = reflects && smooth_; any(there))
+            s = select(there, mirror(baseFresnel(wo_.z) / probability_[kReflection], false), s);
+    if constexpr (F.layers)
+        if (const Mask<Real> there = coats && coatSmooth_; any(there))
+            s = select(there, mirror(Colour(coatFresnel(wo_.z) / probability_[kCoat]), true), s);
+    return s;
 }
 
 }  // namespace vlx::render

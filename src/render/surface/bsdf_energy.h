@@ -75,21 +75,24 @@ BasicBsdf<F, Real>::BasicBsdf(const Surface& s, const Vector& wo, Mask<Real> fro
     Real sheenEnergy{};
     base_ = spread<Real>(1);
     if constexpr (F.layers) {
-        const float cosO = wo.z;
-        if (coat_ > 0) {
+        const Real cosO = wo.z;
+        if (const Mask<Real> coated = coat_ > 0; any(coated)) {
             countEffect(Effect::Clearcoat);
-            const Albedo a = coatTable.row(s.clearcoatRoughness).at(cosO);
-            coatAlbedo_ = coat_ * (kCoatF0 * (a.whole - a.dielectric) + a.dielectric);
-            if (!coatSmooth_) coatLambdaO_ = Ggx{coatAlpha_}.lambda(wo);
+            const auto a = rowsOf(coatTable, s.clearcoatRoughness).at(cosO);
+            const Real albedo = coat_ * (kCoatF0 * (a.whole - a.dielectric) + a.dielectric);
+            coatAlbedo_ = coated ? albedo : Real{};
+            if (!all(coatSmooth_)) coatLambdaO_ = GgxOf<Real>{coatAlpha_}.lambda(wo);
         }
-        base_ = 1 - coatAlbedo_;
-        if (!isBlack(s.sheenColour)) {
+        base_ = 1.f - coatAlbedo_;
+        if (const Mask<Real> has = !isBlack(s.sheenColour); any(has)) {
             countEffect(Effect::Sheen);
             sheenRoughness_ = s.sheenRoughness;
-            const float albedo = s.sheenTable->albedo(cosO, sheenRoughness_);
-            sheen_ = s.sheenColour * (base_ / std::max(1.f, albedo));
+            const Real albedo = eachLane(has, [&](std::size_t i) {
+                return s.sheenTable[i]->albedo(laneOf(cosO, i), laneOf(sheenRoughness_, i));
+            });
+            sheen_ = select(has, s.sheenColour * (base_ / larger(spread<Real>(1), albedo)), Colour{});
             sheenEnergy = maxComponent(sheen_) * albedo;
-            base_ -= sheenEnergy;
+            base_ = base_ - sheenEnergy;
         }
     }
     if constexpr (F.reflection)
@@ -158,13 +161,20 @@ void BasicBsdf<F, Real>::setReflecting(const Surface& s, [[maybe_unused]] Mask<R
     Colour through;
     if constexpr (F.glass) {
         // Smooth glass without a change of index neither bends nor spreads light.
-        glassSmooth_ = smooth_ || std::abs(eta_ - 1) < 1e-3f;
+        glassSmooth_ = smooth_ || magnitude(eta_ - 1.f) < 1e-3f;
         glassWeight_ = glass * base_;
-        if (glassWeight_ > 0 && !glassSmooth_ && s.glassTable != nullptr)
-            glassWeight_ /= std::max(0.05f, s.glassTable->kept(cosO, s.roughness, fromInside));
-        if (glass > 0) {
+        if (const Mask<Real> spreads = glassWeight_ > 0 && !glassSmooth_; any(spreads)) {
+            const Real kept = eachLane(spreads, [&](std::size_t i) {
+                const GlassTable* table = s.glassTable[i];
+                if (table == nullptr) return 1.f;
+                const bool inside = laneOf(fromInside ? spread<Real>(1) : Real{}, i) > 0;
+                return std::max(0.05f, table->kept(laneOf(cosO, i), laneOf(s.roughness, i), inside));
+            });
+            glassWeight_ = spreads ? glassWeight_ / kept : glassWeight_;
+        }
+        if (const Mask<Real> transmits = glass > 0; any(transmits)) {
             const GlassSplit split = splitAt(cosO);
-            through = (split.reflected + split.transmitted) * (glass * base_);
+            through = select(transmits, (split.reflected + split.transmitted) * (glass * base_), Colour{});
         }
     }
     albedo_ = Colour(coatAlbedo_ + sheenEnergy) + single + spreadLight + through;

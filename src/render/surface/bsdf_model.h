@@ -35,8 +35,8 @@ struct SurfaceParametersOf {
     Real sheenRoughness{};
     EffectSet leftOut;  ///< of diffuse, glossy, mirror, transmission, rough transmission
     const AlbedoTable* albedoTable = nullptr;  ///< of this ior; required
-    const SheenTable* sheenTable = nullptr;    ///< required where there is sheen
-    const GlassTable* glassTable = nullptr;    ///< of this ior; without it rough glass loses a little energy
+    Tables<SheenTable, Real> sheenTable;       ///< required where there is sheen
+    Tables<GlassTable, Real> glassTable;       ///< of this ior; without it rough glass loses a little energy
     const DielectricLayerOf<Real>* layer = nullptr;  ///< of these; null: not known beforehand
 };
 using SurfaceParameters = SurfaceParametersOf<float>;
@@ -82,6 +82,20 @@ struct BsdfSampleOf {
 };
 using BsdfSample = BsdfSampleOf<float>;
 
+/// The one or the other, lane by lane.
+template <class Real>
+BsdfValueOf<Real> select(Mask<Real> first, const BsdfValueOf<Real>& a, const BsdfValueOf<Real>& b) {
+    return {select(first, a.value, b.value), first ? a.pdf : b.pdf};
+}
+template <class Real>
+BsdfSampleOf<Real> select(Mask<Real> first, const BsdfSampleOf<Real>& a, const BsdfSampleOf<Real>& b) {
+    const auto either = [&](Mask<Real> p, Mask<Real> q) -> Mask<Real> { return first ? p : q; };
+    return {select(first, a.wi, b.wi), select(first, a.weight, b.weight),
+            first ? a.pdf : b.pdf,     either(a.delta, b.delta),
+            either(a.coat, b.coat),    either(a.through, b.through),
+            either(a.folded, b.folded)};
+}
+
 /// Scattering at a point of a glTF surface, in the local frame whose z axis is the shading normal on the
 /// viewer's side: wo.z > 0. `wo` points to the viewer, `wi` to the light.
 ///
@@ -120,11 +134,11 @@ using BsdfSample = BsdfSampleOf<float>;
 /// the part of its lobe that is above the surface.
 ///
 /// `F`: what the surface may have. Parts that F lacks are not compiled. `Real`: float, or Lanes for four
-/// points of four surfaces, which have neither layers nor glass.
+/// points of four surfaces.
 template <Features F, class Real = float>
 class BasicBsdf {
     static_assert(F.reflection || !(F.layers || F.glass), "layers and glass reflect");
-    static_assert(std::same_as<Real, float> || !(F.layers || F.glass || F.rare), "four at once have neither");
+    static_assert(std::same_as<Real, float> || !F.rare, "effects are left out of one surface at a time");
 
   public:
     using Vector = Vec3Of<Real>;
@@ -141,8 +155,7 @@ class BasicBsdf {
 
     Value evaluate(const Vector& wi) const;
     /// `direction` chooses within the lobe, `choice` the lobe.
-    BsdfSample sample(Vec2 direction, float choice) const requires std::same_as<Real, float>;
-    Sample sample(const Vec2Of<Lanes>& direction, Lanes choice) const requires std::same_as<Real, Lanes>;
+    Sample sample(const Vec2Of<Real>& direction, Real choice) const;
 
     /// Estimate of the reflectance (transmission included) towards wo.
     const Colour& albedo() const { return albedo_; }
@@ -162,25 +175,23 @@ class BasicBsdf {
     Vector imageOf(const Vector& wi) const { return wi - up_ * (2.f * dot(wi, up_)); }
 
     Colour baseFresnel(Real cosH) const;
-    float coatFresnel(float cosH) const;
+    Real coatFresnel(Real cosH) const;
     Value baseReflection(const Vector& wi) const;
-    BsdfValue coatReflection(const Vec3& wi) const;
+    Value coatReflection(const Vector& wi) const;
     Value diffuse(const Vector& wi) const;
     Real retroFactor(const Vector& wi) const;
-    BsdfValue glass(const Vec3& wi) const;
-    BsdfValue sheen(const Vec3& wi) const;
+    Value glass(Mask<Real> there, const Vector& wi) const;
+    Value sheen(Mask<Real> there, const Vector& wi) const;
     void leaveOut(const EffectSet& effects);
     void leaveAbove(Mask<Real> tilted);
     void setReflecting(const Surface& s, Mask<Real> fromInside, Real glass, Real sheenEnergy);
     struct GlassSplit {
-        Rgb reflected;
-        Rgb transmitted;
-        float reflectProbability;
+        Colour reflected;
+        Colour transmitted;
+        Real reflectProbability;
     };
-    GlassSplit splitAt(float cosH) const;
+    GlassSplit splitAt(Real cosH) const;
     Sample mirror(const Colour& weight, bool coat) const;
-    BsdfSample sampleMicrofacet(float alpha, Vec2 u) const;
-    BsdfSample sampleGlass(Vec2 u, float choice) const;
     Sample finish(Vector wi, Mask<Real> through) const;
     Sample settled(Sample delta) const;
 
@@ -201,7 +212,7 @@ class BasicBsdf {
     Real coatLambdaO_{};   ///< of the coat's
     Mask<Real> smooth_;    ///< the base reflects as a delta function
     Mask<Real> coatSmooth_;
-    bool glassSmooth_ = true;
+    Mask<Real> glassSmooth_ = always<Real>();
     Mask<Real> onlyDelta_;
 
     Real coat_;     ///< clearcoat factor

@@ -184,6 +184,24 @@ struct AlbedoRowOfReal<Lanes> {
 template <class Real>
 using AlbedoRowOf = typename AlbedoRowOfReal<Real>::Type;
 
+inline AlbedoTable::Row rowsOf(const AlbedoTable& table, float roughness) { return table.row(roughness); }
+inline AlbedoRowLanes rowsOf(const AlbedoTable& table, Lanes roughness) {
+    return {
+        {table.row(roughness[0]), table.row(roughness[1]), table.row(roughness[2]), table.row(roughness[3])}};
+}
+
+/// A table for each lane.
+template <class Table, class Real>
+struct Tables {
+    const Table* table = nullptr;
+    const Table* operator[](std::size_t) const { return table; }
+};
+template <class Table>
+struct Tables<Table, Lanes> {
+    std::array<const Table*, kLanes> table{};
+    const Table* operator[](std::size_t i) const { return table[i]; }
+};
+
 /// Fraction of energy that single-scattering GGX reflection and refraction keep together at a dielectric
 /// boundary of one index of refraction, seen from each side.
 class GlassTable {

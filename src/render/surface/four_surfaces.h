@@ -11,10 +11,13 @@ inline BsdfSample lane(const BsdfSampleOf<Lanes>& s, std::size_t i) {
             .weight = lane(s.weight, i),
             .pdf = s.pdf[i],
             .delta = s.delta[i] != 0,
+            .coat = s.coat[i] != 0,
+            .through = s.through[i] != 0,
             .folded = s.folded[i] != 0};
 }
 
-/// Of four surfaces, without coat, sheen and glass; refers to their layers.
+/// Of four surfaces: of what `F` has.
+template <Features F>
 class FourSurfaces {
   public:
     template <class Function>
@@ -39,6 +42,17 @@ class FourSurfaces {
         layer_.mean = vectorsOf([&](std::size_t i) { return layer[i]->mean; });
         layer_.rest = vectorsOf([&](std::size_t i) { return layer[i]->rest; });
         all_.layer = &layer_;
+        if constexpr (F.layers) {
+            all_.clearcoat = lanesOf([&](std::size_t i) { return s[i].clearcoat; });
+            all_.clearcoatRoughness = lanesOf([&](std::size_t i) { return s[i].clearcoatRoughness; });
+            all_.sheenColour = vectorsOf([&](std::size_t i) { return s[i].sheenColour; });
+            all_.sheenRoughness = lanesOf([&](std::size_t i) { return s[i].sheenRoughness; });
+            for (std::size_t i = 0; i < kLanes; ++i) all_.sheenTable.table[i] = s[i].sheenTable[0];
+        }
+        if constexpr (F.glass) {
+            all_.transmission = lanesOf([&](std::size_t i) { return s[i].transmission; });
+            for (std::size_t i = 0; i < kLanes; ++i) all_.glassTable.table[i] = s[i].glassTable[0];
+        }
     }
     FourSurfaces(const FourSurfaces&) = delete;
     FourSurfaces& operator=(const FourSurfaces&) = delete;

@@ -74,10 +74,11 @@ Real dielectricFresnel(Real cosTheta, Real eta) {
 
 /// The direction of `wo` refracted at `h` (wo.h > 0) into the far side; only when there is no total internal
 /// reflection (dielectricFresnel < 1).
-inline Vec3 refracted(const Vec3& wo, const Vec3& h, float eta) {
-    const float cosO = dot(wo, h);
-    const float cosT = std::sqrt(std::max(0.f, 1 - (1 - cosO * cosO) / (eta * eta)));
-    return h * (cosO / eta - cosT) - wo * (1 / eta);
+template <class Real>
+Vec3Of<Real> refracted(const Vec3Of<Real>& wo, const Vec3Of<Real>& h, Real eta) {
+    const Real cosO = dot(wo, h);
+    const Real cosT = squareRoot(larger(Real{}, 1.f - (1.f - cosO * cosO) / (eta * eta)));
+    return h * (cosO / eta - cosT) - wo * (1.f / eta);
 }
 
 }  // namespace vlx::render
