@@ -31,8 +31,7 @@ int printCameras(const TraceOptions& o, const Scene& loaded) {
 }
 
 int printPlan(const TraceOptions& o, const Scene& loaded, const Plan& plan, const IntegratorChoice& choice) {
-    const auto shares = pilotShares(loaded, plan, o.render);
-    const auto hits = pilotHits(loaded, o.render);
+    const auto [shares, hits] = pilotEffects(loaded, plan, o.render);
     if (o.explain == "json") {
         nlohmann::ordered_json list = nlohmann::ordered_json::array();
         for (const PlannedEffect& e : plan.effects) {

@@ -115,7 +115,7 @@ SampleBand BandTracer::trace(const Window& rows, const std::function<void(std::i
     }
     const ChannelArrays direct(band);
     const auto fill = kStream / (static_cast<std::size_t>(options_.spp) * kRegionSize * kRegionSize);
-    const std::size_t together = std::clamp<std::size_t>(fill, 1, 64);
+    const std::size_t together = std::max<std::size_t>(fill, 1);
     const auto runs = static_cast<std::int64_t>((grid.count() + together - 1) / together);
     parallelFor(0, runs, [&](std::int64_t i) {
         const std::size_t first = static_cast<std::size_t>(i) * together;

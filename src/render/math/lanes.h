@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 /// Four floats side by side, and what formulas that are written once for a float and for four (`Real`) use.
 /// Every function gives each lane the bits that the float's version gives.
@@ -12,17 +13,13 @@ inline constexpr std::size_t kLanes = 4;
 using Lanes [[gnu::vector_size(16)]] = float;
 using LaneMask [[gnu::vector_size(16)]] = std::int32_t;
 
-template <class Real>
-struct MaskOfReal {
-    using Type = bool;
-};
-template <>
-struct MaskOfReal<Lanes> {
-    using Type = LaneMask;
-};
+/// What stands for a float's and for four's.
+template <class Real, class OfOne, class OfFour>
+using PerReal = std::conditional_t<std::is_same_v<Real, float>, OfOne, OfFour>;
+
 /// Of comparisons.
 template <class Real>
-using Mask = typename MaskOfReal<Real>::Type;
+using Mask = PerReal<Real, bool, LaneMask>;
 
 inline bool any(bool mask) { return mask; }
 inline bool any(LaneMask mask) {

@@ -123,11 +123,16 @@ double relativeVariance(std::span<const PathSample> pixel) {
 
 }  // namespace
 
-std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, const Plan& plan,
-                                                        const RenderOptions& options) {
-    std::array<std::optional<double>, kEffects> shares;
-    if (scene.vertices.size() > 2'000'000) return shares;
+EffectPilot pilotEffects(const Scene& scene, const Plan& plan, const RenderOptions& options) {
+    EffectPilot found;
     const Accelerator accelerator(scene, options.path.effects);
+    const PathTracer tracer(scene, accelerator,
+                            View(scene.cameras[options.camera], options.width, options.height), options.path);
+    const PathTracer::Hits hits = tracer.hits(gridSamples(options));
+    const auto all = static_cast<double>(std::accumulate(hits.begin(), hits.end(), std::uint64_t{0}));
+    for (std::size_t k = 0; k < hits.size() && all > 0; ++k)
+        found.hits[k] = static_cast<double>(hits[k]) / all;
+    if (scene.vertices.size() > 2'000'000) return found;
     const Variant whole(scene, plan, options, accelerator, std::nullopt);
     whole.run(options);  // warm
     for (const PlannedEffect& e : plan.effects) {
@@ -138,21 +143,9 @@ std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, cons
             with = std::min(with, whole.run(options));
             less = std::min(less, without.run(options));
         }
-        shares[static_cast<std::size_t>(e.effect)] = with > 0 ? std::max(0.0, 1 - less / with) : 0;
+        found.shares[static_cast<std::size_t>(e.effect)] = with > 0 ? std::max(0.0, 1 - less / with) : 0;
     }
-    return shares;
-}
-
-std::array<double, kKernelNames.size()> pilotHits(const Scene& scene, const RenderOptions& options) {
-    const Accelerator accelerator(scene, options.path.effects);
-    const PathTracer tracer(scene, accelerator,
-                            View(scene.cameras[options.camera], options.width, options.height), options.path);
-    const PathTracer::Hits hits = tracer.hits(gridSamples(options));
-    const auto all = static_cast<double>(std::accumulate(hits.begin(), hits.end(), std::uint64_t{0}));
-    std::array<double, kKernelNames.size()> shares{};
-    for (std::size_t k = 0; k < hits.size(); ++k)
-        shares[k] = all > 0 ? static_cast<double>(hits[k]) / all : 0;
-    return shares;
+    return found;
 }
 
 PilotMeasure pilotMeasure(const Scene& scene, const Accelerator& accelerator, const RenderOptions& options,

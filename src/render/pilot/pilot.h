@@ -9,16 +9,18 @@
 
 namespace vlx::render {
 
-/// Part of the tracing time that each effect takes: 1 less the time without it over the time with it, from a
-/// few thousand samples each, processor time. Measured, so it differs a little from run to run. Nothing for
-/// effects that are not called for, and for all of them when the scene has more than two million vertices.
-/// `scene`: the plan applied; `options`: of the picture.
-std::array<std::optional<double>, kEffects> pilotShares(const Scene& scene, const Plan& plan,
-                                                        const RenderOptions& options);
+struct EffectPilot {
+    /// Part of the tracing time that each effect takes: 1 less the time without it over the time with it,
+    /// processor time. Measured, so it differs a little from run to run. Nothing for effects that are not
+    /// called for, and for all of them when the scene has more than two million vertices.
+    std::array<std::optional<double>, kEffects> shares;
+    /// Part of the surfaces met by paths that each of the path tracer's kernels works on, as in kKernelNames.
+    /// 0 for all where nothing is met.
+    std::array<double, kKernelNames.size()> hits{};
+};
 
-/// Part of the surfaces met by paths that each of the path tracer's kernels works on, as in kKernelNames: of
-/// the same samples. 0 for all where nothing is met.
-std::array<double, kKernelNames.size()> pilotHits(const Scene& scene, const RenderOptions& options);
+/// Of a few thousand samples. `scene`: the plan applied; `options`: of the picture.
+EffectPilot pilotEffects(const Scene& scene, const Plan& plan, const RenderOptions& options);
 
 /// What a few samples, spread over the picture, say of all.
 struct PilotMeasure {

@@ -174,7 +174,7 @@ BsdfSampleOf<Real> BasicBsdf<F, Real>::finish(Vector wi, Mask<Real> through) con
 /// A delta lobe's sample on the side of the true surface where it belongs.
 template <Features F, class Real>
 BsdfSampleOf<Real> BasicBsdf<F, Real>::settled(Sample s) const {
-    s.delta = Real{} == 0;
+    s.delta = always<Real>();
     const Mask<Real> beneath = dot(s.wi, up_) < 0;
     s.folded = beneath != s.through;
     s.wi = select(s.folded, imageOf(s.wi), s.wi);
@@ -185,7 +185,7 @@ template <Features F, class Real>
 BsdfSampleOf<Real> BasicBsdf<F, Real>::mirror(const Colour& weight, bool coat) const {
     countEffect(Effect::Mirror);
     return settled(
-        {.wi = {-wo_.x, -wo_.y, wo_.z}, .weight = weight, .coat = coat ? Real{} == 0 : Mask<Real>{}});
+        {.wi = {-wo_.x, -wo_.y, wo_.z}, .weight = weight, .coat = coat ? always<Real>() : Mask<Real>{}});
 }
 
 template <Features F, class Real>
@@ -210,7 +210,8 @@ BsdfSampleOf<Real> BasicBsdf<F, Real>::sample(const Vec2Of<Real>& direction, Rea
     Mask<Real> cosine = chosen(kDiffuse), reflects{}, coats{};
     if constexpr (F.reflection) reflects = chosen(kReflection);
     if constexpr (F.layers) {
-        cosine = cosine || chosen(kSheen);
+        const Mask<Real> sheens = chosen(kSheen);
+        cosine = cosine || sheens;
         coats = chosen(kCoat);
     }
 

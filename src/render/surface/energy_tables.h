@@ -33,15 +33,7 @@ struct AlbedoLanes {
 };
 
 template <class Real>
-struct AlbedoOfReal {
-    using Type = Albedo;
-};
-template <>
-struct AlbedoOfReal<Lanes> {
-    using Type = AlbedoLanes;
-};
-template <class Real>
-using AlbedoOf = typename AlbedoOfReal<Real>::Type;
+using AlbedoOf = PerReal<Real, Albedo, AlbedoLanes>;
 
 /// How far the exact Fresnel reflectance at cosTheta has risen from normal (0) to grazing incidence (1).
 /// Where glTF's sample code has Schlick's (1 - cos)^5: that is 15 % too low at 65 degrees for glass.
@@ -174,15 +166,7 @@ struct AlbedoRowLanes {
 };
 
 template <class Real>
-struct AlbedoRowOfReal {
-    using Type = AlbedoTable::Row;
-};
-template <>
-struct AlbedoRowOfReal<Lanes> {
-    using Type = AlbedoRowLanes;
-};
-template <class Real>
-using AlbedoRowOf = typename AlbedoRowOfReal<Real>::Type;
+using AlbedoRowOf = PerReal<Real, AlbedoTable::Row, AlbedoRowLanes>;
 
 inline AlbedoTable::Row rowsOf(const AlbedoTable& table, float roughness) { return table.row(roughness); }
 inline AlbedoRowLanes rowsOf(const AlbedoTable& table, Lanes roughness) {
